@@ -7,7 +7,7 @@ Every command is available as a function:
         cdtool.init_study(logs, "study")                                    -> DraftedStudy: also of benchmark.toml
         cdtool.convert("run.csv", "run.parquet", "machine.toml")            -> Converted
         cdtool.recover("damaged.mcap", "clean.mcap")                        -> Recovered
-    cdtool.learn_signature(logs, "machine.toml", "feekf")               -> Learned
+    cdtool.learn_signature(logs, "machine.toml", "feekf")               -> LearnedSignature
     cdtool.check_signature("gate.json", logs, "machine.toml")           -> Checked: coverage, drift, advice
     cdtool.update_signature("gate.json", logs, "machine.toml")          -> Updated: the runs added and refused
     cdtool.detect("hit.csv", "machine.toml", signature="gate.json")     -> DetectionResult; of a list DetectionResults

@@ -26,8 +26,6 @@ SCRIPTS = DOCS / "examples" / "gallery"
 # The order of the pages.
 NAMES = (
     "first_look",
-    "learn_and_detect",
-    "compare_detectors",
     "tune",
     "write_a_detector",
     "sweep_a_parameter",

@@ -53,7 +53,10 @@ def _of_contacts(evaluated: Evaluated, items: Sequence[Summary], alarms: Mapping
 
     first, *others = sorted(items, key=rank)
     alike = [item for item in others if rank(item)[:2] == rank(first)[:2]]
-    equal = [first.detector, *(item.detector for item in alike if number(item.median_ms) == number(first.median_ms))]
+    equal = [
+        first.detector,
+        *(item.detector for item in alike if _ms(item, item.median_ms) == _ms(first, first.median_ms)),
+    ]
     words = "every detector missed contacts; " if others and all(item.missed for item in items) else ""
     words += _named(equal) + (" are equally good" if len(equal) > 1 else " is best" if others else "")
     count = alarms[first.detector]
@@ -63,11 +66,15 @@ def _of_contacts(evaluated: Evaluated, items: Sequence[Summary], alarms: Mapping
 
 def _median(item: Summary) -> str:
     """Return the median with its interval, or with the range where contacts are too few for one."""
-    value, *ends = value_and_interval(item.median)
+    value, *ends = value_and_interval(item.median, item.resolution_ms)
     unit = " ms" if math.isfinite(item.median_ms) else ""
     if math.isnan(item.median.low):
-        return f"{value}{unit} (range {number(item.min_ms)} to {number(item.max_ms)})"
+        return f"{value}{unit} (range {_ms(item, item.min_ms)} to {_ms(item, item.max_ms)})"
     return f"{value}{unit}{''.join(ends).replace('(', '(95 %: ')}"
+
+
+def _ms(item: Summary, latency: float) -> str:
+    return number(latency, error=item.resolution_ms)
 
 
 def _outcomes(item: Summary) -> str:

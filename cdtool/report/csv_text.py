@@ -6,29 +6,36 @@ import csv
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from io import StringIO
+from io import SEEK_END, StringIO
 
 from cdtool.base.plain_text import plain
+from cdtool.results.results import Results
 
 # A spreadsheet runs a cell that begins with one of these (the last four are their full-width forms). If its list
 # separator is a semicolon, a cell begins after each of them, in quotation marks or not.
 _RUN_BY_SPREADSHEETS = re.compile(r"(^|;)(\s*)(?=[=+\-@＝＋－＠])")
 
 
-def csv_lines(names: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str]:
-    """Yield a line of names and a line per row; empty = no value."""
-    text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+def csv_lines(results: Results, names: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str]:
+    """Yield a line of names and a line per row; empty = no value.
+
+    With `[report] decimal = "comma"` as Excel opens a file where numbers have a comma: semicolons, and the byte order
+    mark without which it reads UTF-8 as the code page of Windows.
+    """
+    decimal = "," if results.provenance.get("report") == {"decimal": "comma"} else "."
+    text = StringIO("\ufeff" if decimal == "," else "")
+    text.seek(0, SEEK_END)
+    writer = csv.writer(text, delimiter=";" if decimal == "," else ",", lineterminator="\n")
     writer.writerow(names)
     for row in rows:
         yield text.getvalue()
         text.seek(0)
         text.truncate()
-        writer.writerow([_cell(value) for value in row])
+        writer.writerow([_cell(value, decimal) for value in row])
     yield text.getvalue()
 
 
-def _cell(value: object) -> object:
+def _cell(value: object, decimal: str) -> object:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
@@ -36,5 +43,5 @@ def _cell(value: object) -> object:
     if isinstance(value, float):
         # What arithmetic leaves behind the digits of a measurement, as in 60.00000000000006 ms, is not written.
         tidy = round(value, 9) if abs(value) >= 1.0 else float(f"{value:.12g}")
-        return tidy if math.isfinite(value) else None
+        return str(tidy).replace(".", decimal) if math.isfinite(value) else None
     return value

@@ -65,7 +65,11 @@ def open_end(item: Summary) -> tuple[float, str] | None:
         least = item.min_ms if item.median.value == math.inf else math.nan
     else:
         least = item.median.low if item.median.high == math.inf else math.nan
-    return (least, f"≥ {number(least)} (n = {item.assessable})") if math.isfinite(least) else None
+    return (
+        (least, f"≥ {number(least, error=item.resolution_ms)} (n = {item.assessable})")
+        if math.isfinite(least)
+        else None
+    )
 
 
 def grouped(rows: Iterable[Summary]) -> bool:

@@ -115,14 +115,14 @@ def count_cell(count: int, tone: str = "") -> Cell:
     return Cell(str(count), key=count, tone=tone if count else "")
 
 
-def number_cell(value: float | None) -> Cell:
-    """Return the cell of a number without an interval."""
-    return Cell(number(value), key=key_of(value))
+def number_cell(value: float | None, error: float | None = None) -> Cell:
+    """Return the cell of a number without an interval, with no digit finer than its error."""
+    return Cell(number(value, error=error), key=key_of(value))
 
 
-def interval_cell(interval: Interval) -> Cell:
+def interval_cell(interval: Interval, error: float | None = None) -> Cell:
     """Return the cell of a value with its interval; one without an upper end takes two lines of small print."""
-    value, *details = value_and_interval(interval)
+    value, *details = value_and_interval(interval, error)
     return Cell(value, tuple(details), key_of(interval.value))
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from html import escape
 from typing import TYPE_CHECKING, Any, get_type_hints
 
 from cdtool.results.results import Results, scalar_of, tables
@@ -17,6 +16,11 @@ if TYPE_CHECKING:
 
 # The order of the outcomes, from detected to what could not be scored.
 OUTCOMES = ("detected", "missed", "not_assessable", "in_progress")
+# What is looked at first of a contact; its row has 25 columns.
+FIRST_OF_CONTACT = [
+    *("recording", "group", "detector", "contact", "outcome", "latency_ms", "onset_s", "alarm_s"),
+    *("force_at_alarm_n", "peak_force_n", "reason"),
+]
 
 
 def rows_as_frame(
@@ -56,34 +60,6 @@ def rows_as_frame(
         else:
             columns[item.name] = pd.Series(values, dtype=_dtype_of(hints[item.name]))
     return pd.DataFrame(columns)
-
-
-def notebook_table(caption: str, frame: pd.DataFrame) -> str:
-    """Return a frame as HTML below a caption, which a notebook shows; of many rows the first and the last ten.
-
-    Parameters
-    ----------
-    caption : str
-        One line above the table.
-    frame : DataFrame
-        The rows; texts in them are escaped.
-
-    Returns
-    -------
-    str
-        HTML; NaN is a dash, and a number has four digits.
-
-    Examples
-    --------
-    >>> from cdtool.results.results import Skipped
-    >>> text = notebook_table("Left out", rows_as_frame(Skipped, [Skipped("<a>.csv", "empty")]))
-    >>> text.startswith("<p>Left out</p><table"), "&lt;a&gt;.csv" in text
-    (True, True)
-    """
-    table = frame.to_html(
-        index=False, na_rep="–", float_format="{:.4g}".format, max_rows=20, show_dimensions=len(frame) > 20
-    )
-    return f"<p>{escape(caption)}</p>{table}"
 
 
 def results_as_frame(results: Results, table: str) -> pd.DataFrame:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.project.pages import DOCS, ROOT, docs_script
+from tests.project.pages import DOCS, ROOT, docs_script, script_at
 
 NAMES = docs_script("make_gallery").NAMES
 _IMPORT = re.compile(r"^(?:>>> )?from (cdtool[\w.]*) import", re.MULTILINE)
@@ -38,6 +38,22 @@ def test_a_page_of_the_gallery_shows_what_its_example_prints(made, name):
 def test_every_example_of_the_gallery_has_a_page():
     assert sorted(path.stem for path in (DOCS / "examples" / "gallery").glob("*.py")) == sorted(NAMES)
     assert sorted(path.stem for path in (DOCS / "gallery").glob("*.md")) == sorted([*NAMES, "index"])
+
+
+def test_the_notebook_shows_the_verdict_and_the_numbers_of_the_readme():
+    pytest.importorskip("ipykernel")
+    pytest.importorskip("nbclient")
+    notebook = DOCS / "examples" / "gate.ipynb"
+    assert '"image/png"' not in notebook.read_text(encoding="utf-8")  # the site shows what its cells give
+    outputs = [item for cell in script_at(DOCS / "site" / "notebook_page.py").run(notebook).cells
+               for item in cell.get("outputs", ())]  # fmt: skip
+    assert {item.output_type for item in outputs} <= {"execute_result", "display_data"}
+    (table,) = [text for item in outputs if "limits are met" in (text := item.data.get("text/html", ""))]
+    rows = re.findall(
+        r"^(stiff|soft) +(\w+) +([\d.]+) ", (ROOT / "README.md").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    for group, detector, median in rows:
+        assert re.search(rf"<td>{group}</td>\s*<td>{detector}</td>\s*<td>{median}(\.0)?\b", table), (group, detector)
 
 
 def test_the_python_page_imports_everything_from_cdtool():

@@ -36,7 +36,7 @@ def test_the_navigation_names_every_page_once_and_only_pages_that_exist(navigati
     named = [name for part in parts for name in part["pages"]]
     assert len(named) == len(set(named))
     for name in named:
-        assert name in pages or (DOCS / f"{name}.md").is_file(), name
+        assert name in pages or any((DOCS / f"{name}.{kind}").is_file() for kind in ("md", "ipynb")), name
     patterns = [item for items in navigation["below"].values() for item in items]
     reached = {(DOCS / f"{name}.md").resolve() for name in named}
     reached |= {file.resolve() for pattern in patterns for file in DOCS.glob(f"{pattern}.md")}

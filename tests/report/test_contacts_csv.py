@@ -6,15 +6,19 @@ import csv
 import io
 import math
 from dataclasses import replace
+from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from cdtool.report.writers.contacts import contacts_lines
 from cdtool.report.writers.forces import forces_lines
 from cdtool.results.results import ForceResult, ForceStepResult, Results
+from tests.command import cdtool
 from tests.report.bench import contact
 from tests.report.hostile import HOSTILE
 
+ROOT = Path(__file__).parents[2]
 RUN = ("=", "+", "-", "@", "＝", "＋", "－", "＠")
 
 
@@ -56,6 +60,27 @@ def test_digits_that_arithmetic_left_behind_are_not_written(results, value, text
     late = replace(contact("momentum", "stiff", 1.0), onset_s=value)
     (found,) = read(contacts_csv(replace(results, contacts=(late,))))
     assert found["onset_s"] == text and float(text) == pytest.approx(value, rel=1e-12)
+
+
+def test_a_decimal_comma_is_read_back_and_stays_with_the_results(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    asked = ("score", ROOT / "docs/examples/triggers.csv", "-b", ROOT / "sample_logs/gate/benchmark.toml")
+    points, commas = ("-o", "points.csv"), ("--set", "report.decimal=comma", "-o", "commas.csv", "-o", "results.json")
+    for _ in range(2):  # the second time it replaces its own files
+        assert {cdtool(*asked, *more).status for more in (points, commas)} == {1}
+    assert cdtool("report", "results.json", "-o", "again.csv").status == 1
+    written = Path("commas.csv").read_bytes()
+    assert written.startswith(b"\xef\xbb\xbfrecording;group;") and written == Path("again.csv").read_bytes()
+    german = pd.read_csv("commas.csv", sep=";", decimal=",")
+    pd.testing.assert_frame_equal(german, pd.read_csv("points.csv"))
+    assert german.onset_s.dtype == "float64" and german.onset_s.notna().all()
+
+
+def test_forces_with_a_decimal_comma_are_read_back(results):
+    plain = with_forces(results, "gap; wide")
+    text = forces_csv(replace(plain, provenance={"report": {"decimal": "comma"}}))
+    german = pd.read_csv(io.StringIO(text.removeprefix("\ufeff")), sep=";", decimal=",")
+    pd.testing.assert_frame_equal(german, pd.read_csv(io.StringIO(forces_csv(plain))))
 
 
 @pytest.mark.parametrize("start", [*RUN, " =", "\t=", "\r=", "\n="])

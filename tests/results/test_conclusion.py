@@ -97,7 +97,7 @@ def assert_same_everywhere(evaluated: Evaluated, tone: str, status: int, folder:
     assert [item.tag for item in first][:-1] == {"bad": ["failure"], "unknown": ["skipped"]}.get(tone, [])
     assert (int(junit.attrib["failures"]) > 0) == (status == 1)
     result = BenchmarkResult(evaluated)
-    assert result.headline == head and head[:40] in repr(result) and str(escape(head)) in result._repr_html_()
+    assert result.headline == head and head[:40] in repr(result) and f"<strong>{shown}</strong>" in result._repr_html_()
     file = folder / "results.json"
     file.write_text(to_json(evaluated.results), encoding="utf-8")
     done = cdtool("report", file)

@@ -11,7 +11,7 @@ import typer
 from cdtool.base.exit_status import Fact
 from cdtool.base.plain_text import LISTED, counted
 from cdtool.commands.console.colour import Toned
-from cdtool.commands.console.console import fits_terminal, leave, number, print_line, say, table
+from cdtool.commands.console.console import fits_terminal, leave, print_line, say, table
 from cdtool.commands.console.truth_shown import show_truth
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from cdtool.results.evaluated import Evaluated
     from cdtool.results.results import CalibrationResult
     from cdtool.results.summary import Summary
-    from cdtool.statistics.interval import Interval
 
 _HEADINGS = {
     "mean": "mean ms\n(95 %)",
@@ -190,24 +189,15 @@ def _row(item: Summary, shown: Sequence[LatencyColumn]) -> tuple[Any, ...]:
 
 
 def _latency(item: Summary, column: LatencyColumn) -> str:
-    """Return a latency with its interval; quantiles have theirs only if they replace the mean."""
-    from cdtool.report.few_contacts import latency_interval
+    """Return a latency as the report shows it; quantiles have their interval only if they replace the mean."""
+    from cdtool.report.number_text import NOTHING
+    from cdtool.report.tables.results import latency_cell
 
-    if column == "range":
-        return _range(item)
-    figure = latency_interval(item, column)
-    if figure is None:
+    cell = latency_cell(column, item)
+    if cell.text == NOTHING:
         return "-"
-    if column == "std":
-        return number(figure.value, 2)
-    bounded = column == "mean" or (column == "median" and item.few)
-    return interval(figure) if bounded else quantile(figure.value)
-
-
-def _range(item: Summary) -> str:
-    """Return the shortest and longest latency; a missed contact counts as later than all."""
-    ends = (quantile(item.min_ms), quantile(item.max_ms))
-    return ends[0] if ends[0] == ends[1] else " to ".join(ends)
+    bounded = column == "mean" or (column == "median" and item.few and not math.isnan(item.median.low))
+    return cell.line if bounded else cell.text
 
 
 def _what(item: CalibrationResult) -> str:
@@ -222,21 +212,6 @@ def _false_alarms(item: Summary) -> Toned | int | str:
 def _counted(count: int, tone: str) -> Toned | int:
     """Return a number that has a tone unless it is 0."""
     return Toned(count, tone) if count else 0
-
-
-def interval(item: Interval) -> str:
-    """Return a value with its interval, as 38.2 (36.0 to 41.1)."""
-    if not math.isfinite(item.value):
-        return quantile(item.value)
-    if math.isnan(item.low) or math.isnan(item.high):
-        return number(item.value)
-    above = "..." if item.high == math.inf else number(item.high)
-    return f"{number(item.value)} ({number(item.low)} to {above})"
-
-
-def quantile(value: float) -> str:
-    """Return a quantile; infinite if too many contacts were missed to reach it."""
-    return "not reached" if value == math.inf else number(value)
 
 
 def _show_bounds(evaluated: Evaluated) -> None:

@@ -21,8 +21,9 @@ from cdtool.commands.detecting.prepared import prepared
 from cdtool.commands.judging.runs import several_logs
 from cdtool.detectors.detection import Status
 from cdtool.recordings.recording import Recording
+from cdtool.report.notebook import notebook_table
 from cdtool.report.plots.figures import described
-from cdtool.results.frames import OUTCOMES, notebook_table, rows_as_frame
+from cdtool.results.frames import FIRST_OF_CONTACT, OUTCOMES, rows_as_frame
 from cdtool.results.results import ContactResult, RecordingFinding, Skipped
 
 if TYPE_CHECKING:
@@ -59,9 +60,9 @@ class _Frames:
 
     @cached_property
     def contacts(self) -> pd.DataFrame:
-        """A row per contact, with the columns of a benchmark's `contacts`."""
+        """A row per contact, with the columns of a benchmark's `contacts`; `detected.contact_rows` has all."""
         rows = [row for run in self._each for of_operation in run.detected.contact_rows for row in of_operation]
-        return rows_as_frame(ContactResult, rows, {"outcome": OUTCOMES})
+        return rows_as_frame(ContactResult, rows, {"outcome": OUTCOMES})[FIRST_OF_CONTACT]
 
     def summary(self) -> pd.DataFrame:
         """Return a row per operation with its verdict."""
@@ -89,7 +90,7 @@ class DetectionResult(_Frames):
     >>> limit = {"threshold.name": "limit", "threshold.limits": 400.0}
     >>> found = cdtool.detect(log, machine, detector="momentum", settings=limit)
     >>> found
-    DetectionResult(03.csv, momentum: alarm, 1 alarm, 1 contact)
+    DetectionResult(1 alarm, 1 contact; momentum on 03.csv)
     >>> found.alarms[["joint", "side"]].values.tolist(), found.contacts.outcome.tolist()
     ([['gate', 'above']], ['detected'])
     """
@@ -156,7 +157,7 @@ class DetectionResult(_Frames):
         )
 
     def __repr__(self) -> str:
-        return f"DetectionResult({PurePath(self.recording.name).name}, {self._detector}: {', '.join(self._words())})"
+        return f"DetectionResult({', '.join(self._words())}; {self._detector} on {PurePath(self.recording.name).name})"
 
     @property
     def _detector(self) -> str:
@@ -164,13 +165,13 @@ class DetectionResult(_Frames):
 
     def _words(self) -> list[str]:
         alarms = sum(len(item.verdict.alarms) for item in self.detections)
-        words = [self.outcome.replace("_", " "), counted(alarms, "alarm")]
-        return [*words, *([counted(len(self.detected.contacts), "contact")] if self.detected.contacts else [])]
+        words = counted(alarms, "alarm") if alarms else self.outcome.replace("_", " ")
+        return [words, *([counted(len(self.detected.contacts), "contact")] if self.detected.contacts else [])]
 
     def _repr_html_(self) -> str:
         """Return the verdict on each operation as a table, which a notebook shows."""
-        caption = f"{self._detector} on {self.recording.name}: {self.detected.threshold}"
-        return notebook_table(caption, self.summary()[_SHOWN])
+        about = f"{self._detector} on {self.recording.name}: {self.detected.threshold}"
+        return notebook_table(", ".join(self._words()), self.summary()[_SHOWN], more=about)
 
 
 class DetectionResults(_Frames, Sequence[DetectionResult]):
@@ -192,7 +193,7 @@ class DetectionResults(_Frames, Sequence[DetectionResult]):
     >>> limit = {"threshold.name": "limit", "threshold.limits": 400.0}
     >>> found = cdtool.detect(logs, "sample_logs/gate/machine.toml", detector="momentum", settings=limit)
     >>> found
-    DetectionResults(2 logs, momentum: 1 alarm)
+    DetectionResults(1 alarm in 2 logs; momentum)
     >>> [log.outcome for log in found]
     ['alarm', 'no alarm']
     """
@@ -237,9 +238,13 @@ class DetectionResults(_Frames, Sequence[DetectionResult]):
         return DetectionResults(self.runs[number]) if isinstance(number, slice) else self.runs[number]
 
     def __repr__(self) -> str:
+        return f"DetectionResults({self._verdict}; {self._detector})"
+
+    @property
+    def _verdict(self) -> str:
         alarms = sum(len(item.verdict.alarms) for run in self for item in run.detections)
-        words = [counted(alarms, "alarm"), *([f"{len(self._skipped)} left out"] if self._skipped else [])]
-        return f"DetectionResults({counted(len(self), 'log')}, {self._detector}: {', '.join(words)})"
+        left_out = [f"{len(self._skipped)} left out"] if self._skipped else []
+        return ", ".join((f"{counted(alarms, 'alarm')} in {counted(len(self), 'log')}", *left_out))
 
     @property
     def _detector(self) -> str:
@@ -247,7 +252,7 @@ class DetectionResults(_Frames, Sequence[DetectionResult]):
 
     def _repr_html_(self) -> str:
         """Return the verdict on each operation as a table, which a notebook shows."""
-        return notebook_table(repr(self), self.summary()[["recording", *_SHOWN]])
+        return notebook_table(self._verdict, self.summary()[_SHOWN], more=self._detector)
 
 
 @overload
@@ -294,7 +299,7 @@ def detect(
     benchmark : str or Path, optional
         A benchmark file: all other settings come from it, except `detector`, which selects one of its detectors,
         `signature`, which replaces its threshold, and `settings`.
-    signature : str, Path, Learned or SignatureFile, optional
+    signature : str, Path, LearnedSignature or SignatureFile, optional
         A signature file or what was learned, which contains detector, threshold, joints and activation.
     detector : str or Detector, optional
         Name or short name of the detector, or a detector of your own; needed without a signature.

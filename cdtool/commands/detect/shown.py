@@ -31,7 +31,11 @@ _TONES = {"missed": "bad", "not_assessable": "unknown"}
 
 def show_detected(done: Sequence[Detected], forces: Mapping[str, ForceSummary]) -> None:
     """Print the table of all logs, then sections that are not assessable, signal notes and estimated forces."""
-    rows = [(found, *pair) for found in done for pair in zip(found.detections, found.matchings, strict=True)]
+    rows = [
+        (found, *of_operation)
+        for found in done
+        for of_operation in zip(found.detections, found.matchings, found.contact_rows, strict=True)
+    ]
     detections = [detection for found in done for detection in found.detections]
     _show(rows, done[0].threshold)
     _show_not_assessable(detections)
@@ -67,7 +71,7 @@ def as_rows(done: Sequence[tuple[Path, Detected]], forces: Mapping[str, ForceSum
     ]
 
 
-def _show(rows: list[tuple[Detected, Detection, Matching]], threshold: str) -> None:
+def _show(rows: Sequence[tuple[Detected, Detection, Matching, Sequence[ContactResult]]], threshold: str) -> None:
     """Print a row per alarm, per contact without an alarm, and per operation without either."""
     cells = [cell for row in rows for cell in _rows_of(*row)]
     first = rows[0][1]
@@ -76,19 +80,25 @@ def _show(rows: list[tuple[Detected, Detection, Matching]], threshold: str) -> N
     columns += [(f"signal\n{unit}", "right"), ("limit", "right"), ("latency\nms", "right"), ("why", "left")]
     print_line(f"{first.detector}: {plain(threshold)}")
     table(columns, cells)
-    rules = {found.onset for found, _, matching in rows for item in matching.matches if item.contact.found_by == _CELL}
+    rules = {
+        found.onset for found, _, matching, _ in rows for item in matching.matches if item.contact.found_by == _CELL
+    }
     for rule in sorted(rules):
         say(f"latency from contact onset to alarm, debounce included; onset: {rule}")
 
 
-def _rows_of(found: Detected, detection: Detection, matching: Matching) -> list[tuple[object, ...]]:
+def _rows_of(
+    found: Detected, detection: Detection, matching: Matching, contacts: Sequence[ContactResult]
+) -> list[tuple[object, ...]]:
     from cdtool.commands.detecting.detection import NO_CONTACT
+    from cdtool.report.number_text import number as rounded
 
     name = detection.operation.name
     latency = {item.alarm: item for item in matching.matches if item.alarm}
+    resolution = {item.alarm: row.resolution_ms for item, row in zip(matching.matches, contacts, strict=True)}
     rows: list[tuple[object, ...]] = []
     for alarm in sorted({*detection.verdict.alarms, *latency}, key=lambda alarm: (alarm.time, alarm.column)):
-        late = number(1e3 * latency[alarm].latency, 3) if alarm in latency else "-"
+        late = rounded(1e3 * latency[alarm].latency, error=resolution[alarm]) if alarm in latency else "-"
         figures = (number(alarm.statistic, 4), number(alarm.limit, 4), late)
         why = "" if alarm in latency else _why_no_latency(found, alarm)
         if alarm in latency and latency[alarm].clipped:

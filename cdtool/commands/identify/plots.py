@@ -12,7 +12,7 @@ from cdtool.base.plain_text import counted
 from cdtool.commands.identify.axis.speed_controller import ControllerComparison
 from cdtool.commands.identify.axis.two_mass import StartComparison
 from cdtool.commands.identify.evidence import CrossValidation, ForceEvidence, FrictionCurve
-from cdtool.detectors.look import BLUE, RED
+from cdtool.detectors.look import BLUE, RUST
 from cdtool.report.number_text import number
 from cdtool.report.plots.figures import drawing, label, new_figure
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 #: Inches, as the other plots of a page.
 _WIDTH = 9.0
-_MEASURED, _UNDER, _MODEL, _RESIDUAL, _BAND = "0.35", "0.6", BLUE, RED, "0.85"
+_MEASURED, _UNDER, _MODEL, _RESIDUAL, _BAND = "0.35", "0.6", BLUE, RUST, "0.85"
 
 
 def draw_unseen_run(validation: CrossValidation, unit: str) -> Figure:

@@ -188,6 +188,16 @@ class TriggersTable:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ReportTable:
+    """[report]: how tables for spreadsheets are written."""
+
+    decimal: Annotated[
+        Literal["point", "comma"],
+        setting("of contacts.csv and forces.csv; comma: with semicolons, as a German or French Excel opens them"),
+    ] = "point"
+
+
+@dataclass(frozen=True, kw_only=True)
 class JudgingTable(DetectorTable):
     """The settings that `score`, `benchmark` and `tune` share."""
 
@@ -198,6 +208,7 @@ class JudgingTable(DetectorTable):
     signature: Annotated[Signature, setting("how the normal band is learned")] = field(default_factory=Signature)
     force: Annotated[ForceTable, setting("limits of the contact force")] = field(default_factory=ForceTable)
     triggers: Annotated[TriggersTable, setting("how a trigger file is read")] = field(default_factory=TriggersTable)
+    report: Annotated[ReportTable, setting("how tables are written")] = field(default_factory=ReportTable)
     execution: Annotated[Execution, setting("how the work is done")] = field(default_factory=Execution)
 
 

@@ -48,7 +48,7 @@ class LearnedSignature:
             f"{motion.described if motion else 'any motion'} from {runs} runs" for motion, runs in self.runs
         )
         skipped = f", {len(self.skipped)} left out" if self.skipped else ""
-        return f"Learned({self.signature.detector}, {self.signature.threshold}: {classes}{skipped})"
+        return f"LearnedSignature({self.signature.detector}, {self.signature.threshold}: {classes}{skipped})"
 
     def save(self, path: str | Path) -> None:
         """Write the signature file, as `cdtool learn-signature -o` does; raises SignatureError."""

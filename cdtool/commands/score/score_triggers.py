@@ -251,8 +251,9 @@ def _released(alarms: Sequence[Alarm], crossings: Sequence[Alarm]) -> tuple[floa
 
 def _provenance(setup: BenchmarkFile, given: TriggerFile) -> dict[str, Any]:
     return {
-        **setup.scoring,
+        **setup.identity,
         "triggers_sha256": given.digest,
         "trigger_clock": setup.triggers.clock,
+        **setup.scoring,
         "plugins": plugin_packages(),
     }

@@ -248,7 +248,7 @@ def _provenance(
 ) -> dict[str, Any]:
     injected = {name: dict(group.injected) for name, group in setup.impacts.items() if group.injected}
     return {
-        **setup.scoring,
+        **setup.identity,
         "gains": {detector.name: asdict(detector) for detector in detectors},
         "threshold": setup.rule.name,
         "threshold_rule": asdict(setup.rule),
@@ -261,6 +261,7 @@ def _provenance(
         **setup.learned_parts,
         "safety_factor_set": "by budget" if setup.budget else "by hand" if set_by_hand(setup.rule) else "by default",
         **setup.activation.described,
+        **setup.scoring,
         "false_alarm_budget": str(setup.budget) if setup.budget else None,
         "units": {detector.name: detector.unit(setup.machine_file.machine) for detector in detectors},
         "short_names": {detector.name: detector.short_name for detector in detectors},

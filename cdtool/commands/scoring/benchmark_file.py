@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
@@ -36,6 +36,7 @@ from cdtool.commands.judging.settings_table import (
     ForceTable,
     JudgingTable,
     LearnPart,
+    ReportTable,
     TriggersTable,
     apply_settings,
     full_keys,
@@ -132,6 +133,7 @@ _READ_BY: Mapping[str, tuple[str, ...]] = {
     "false_alarm_budget": ("benchmark", "inject", "detect", "explain"),
     "inject": ("benchmark", "tune", "inject"),
     "triggers": ("score",),
+    "report": ("benchmark", "score"),
     "tune": ("tune",),
     "protocol": (),
 }
@@ -252,6 +254,7 @@ class BenchmarkFile:
     settings: Mapping[str, Any] = field(default_factory=dict)
     tune: Any = None
     triggers: TriggersTable = field(default_factory=TriggersTable)
+    report: ReportTable = field(default_factory=ReportTable)
     execution: Execution = field(default_factory=Execution)
 
     def with_made(self, workers: Workers) -> BenchmarkFile:
@@ -264,17 +267,24 @@ class BenchmarkFile:
         return tuple(getattr(self.rule, "limits", ()))
 
     @property
-    def scoring(self) -> dict[str, Any]:
-        """Return the files and the settings that determine the results, for provenance."""
-        reduction = self.machine_file.force_reduction
+    def identity(self) -> dict[str, Any]:
+        """Return what identifies the benchmark, for provenance, and how its tables are written if it says so."""
         return {
             "tool": "cdtool",
             "tool_version": __version__,
             "benchmark_sha256": self.digest,
             **({"settings": dict(self.settings)} if self.settings else {}),
+            **({"report": asdict(self.report)} if self.report != ReportTable() else {}),
             "machine": self.machine_file.machine.name,
             "machine_sha256": self.machine_file.digest,
             **({"simulated": True} if self.machine_file.simulated else {}),
+        }
+
+    @property
+    def scoring(self) -> dict[str, Any]:
+        """Return the settings that determine the results, for provenance; only results with equal settings compare."""
+        reduction = self.machine_file.force_reduction
+        return {
             "onset": self.onset.described if self.machine_file.maps("force") else "as labelled",
             **({"force": reduction} if reduction else {}),
             "separation_s": self.onset.separation,
@@ -542,6 +552,7 @@ def _resolved(
         settings=settings,
         tune=None if table.tune is None else read(SECTIONS.load("tune").table, table.tune, place.below("tune")),
         triggers=table.triggers,
+        report=table.report,
         execution=table.execution,
     )
     table.check_joints(place, machine)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -12,17 +14,20 @@ from cdtool.base.plain_text import counted, first_of, shorten
 from cdtool.base.remote.remote_path import location
 from cdtool.report.plots.figures import described
 from cdtool.results.evaluated import Evaluated
-from cdtool.results.frames import notebook_table, results_as_frame
+from cdtool.results.frames import FIRST_OF_CONTACT, results_as_frame
 from cdtool.results.results import Results
-from cdtool.results.summary import FIGURES
+from cdtool.results.summary import FIGURES, Summary
 from cdtool.results.traces.trace import Trace
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-_COUNTS = ("contacts", "detected", "missed", "not_assessable", "false_alarms", "operations", "hours")
-_SHOWN = ["group", "detector", "detected", "missed", "not_assessable", "median_ms", "mean_ms", "false_alarms"]
+_FIRST = (
+    *("contacts", "detected", "missed", "missed_share_at_most", "not_assessable", "false_alarms", "operations"),
+    *("median_ms", "min_ms", "max_ms", "mean_ms", "p95_ms", "force_at_alarm_n"),
+)
+_METRICS: dict[str, Callable[[Summary], float]] = {"min_ms": lambda item: item.min_ms, **FIGURES}
 
 
 @dataclass(frozen=True)
@@ -81,8 +86,11 @@ class BenchmarkResult:
 
     @cached_property
     def contacts(self) -> pd.DataFrame:
-        """A row per contact and detector; `latency_ms` is NaN unless `outcome` is "detected"."""
-        return self.frame("contacts")
+        """What is looked at first of each contact; `latency_ms` is NaN unless `outcome` is "detected".
+
+        `frame("contacts")` has all columns.
+        """
+        return self.frame("contacts")[FIRST_OF_CONTACT]
 
     @cached_property
     def false_alarms(self) -> pd.DataFrame:
@@ -138,22 +146,31 @@ class BenchmarkResult:
             raise UsageError(f"no table '{table}' in the results", nearest(table, tuple(tables())))
         return results_as_frame(self.results, table)
 
-    def summary(self) -> pd.DataFrame:
-        """Return the statistics of each detector in each group: the metrics that `[limits]` may name.
+    def summary(self, *, every: bool = False) -> pd.DataFrame:
+        """Return the statistics of each detector in each group.
+
+        Parameters
+        ----------
+        every : bool, optional
+            All metrics that `[limits]` may name, not only those to look at first.
 
         Returns
         -------
         DataFrame
             Index: group and detector, in the order of the benchmark file, changed conditions last. All columns are
             floats, NaN where a metric is not known. The counts are first, because a latency means nothing without
-            them: `median_ms` and `p95_ms` count a missed contact as later than all others, `mean_ms` and `std_ms` are
-            those of the detected contacts.
+            them: the median, the range and `p95_ms` count a missed contact as later than all others, `mean_ms` and
+            `std_ms` are those of the detected contacts. Below ten of these there is no mean and no P95, as in reports.
         """
         import pandas as pd
 
         items = (*self.evaluated.summaries, *self.evaluated.conditions)
-        names = [*_COUNTS, *(name for name in FIGURES if name not in _COUNTS)]
-        values = {name: [float(FIGURES[name](item)) for item in items] for name in names}
+        names = [*_FIRST, *(name for name in FIGURES if every and name not in _FIRST)]
+        few_have_none = {name for name in names if name.startswith(("mean", "std", "p95"))}
+        values = {
+            name: [math.nan if item.few and name in few_have_none else float(_METRICS[name](item)) for item in items]
+            for name in names
+        }
         of_rows = {"group": self.results.every_group, "detector": self.results.detectors}
         index = [pd.Categorical([getattr(item, name) for item in items], of_rows[name]) for name in of_rows]
         return pd.DataFrame(values, index=pd.MultiIndex.from_arrays(index, names=list(of_rows)), dtype="float64")
@@ -199,11 +216,16 @@ class BenchmarkResult:
                 (results.recordings, "recording"),
             )
         )
-        return f"BenchmarkResult({size}: {shorten(self.headline, 100)})"  # one line
+        return f"BenchmarkResult({shorten(self.headline, 100)}; {size})"  # one line
 
     def _repr_html_(self) -> str:
-        """Return the statistics as a table, which a notebook shows."""
-        return notebook_table(f"Benchmark: {self.headline}", self.summary().reset_index()[_SHOWN])
+        """Return the verdict and the table of results of the reports, which a notebook shows."""
+        from cdtool.report.model import counts_text
+        from cdtool.report.notebook import as_frame, notebook_table
+        from cdtool.report.tables.results import results_table
+
+        rows = as_frame(results_table(self.evaluated.summaries))
+        return notebook_table(self.headline, rows, self.results.conclusion.tone, counts_text(self.evaluated))
 
 
 @dataclass(frozen=True)
@@ -269,7 +291,9 @@ class BenchmarkPlots:
             hint = nearest(asked, tuple(known)) if known else "run the benchmark, or keep results.traces.json.gz"
             raise UsageError(f"no curves of '{asked}' were kept" if asked else "no curves were kept", hint)
         trace = most_informative(found)
-        return described(trigger_figure(trace), f"{trace.recording}: load cell and all detectors over time")
+        return described(
+            trigger_figure(trace, self.result.results), f"{trace.recording}: load cell and all detectors over time"
+        )
 
 
 def _names_of(trace: Trace) -> tuple[str, str]:

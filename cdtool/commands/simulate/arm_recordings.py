@@ -193,7 +193,6 @@ def _machine_toml(arm: ArmParameters, count: float) -> str:
     viscous = [arm.viscous_friction * ratio**2 for ratio in arm.transmission_ratio]
     scale = f"{count:.10g}"
     return f"""simulated = true  # a robot arm by cdtool simulate arm: what its maker would know of it
-
 [machine]
 type = "planar_arm"
 name = "robot arm"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cdtool.detectors.look import BLUE, OCHRE, PLUM, RUST, TEAL
 from cdtool.impact.sensor_ranking import Ranking, SensorResponse
 from cdtool.report.number_text import number
 from cdtool.report.plots.figures import drawing, label, new_figure, save
@@ -17,11 +18,11 @@ if TYPE_CHECKING:
 
 # Kinds of sensor by location, from the contact to the controller.
 _COLOURS = {
-    "contact_force": "#D55E00",
-    "drive_force": "#E69F00",
-    "load_acceleration": "#009E73",
-    "motor_position": "#0072B2",
-    "motor_force": "#B0569B",
+    "contact_force": RUST,
+    "drive_force": OCHRE,
+    "load_acceleration": TEAL,
+    "motor_position": BLUE,
+    "motor_force": PLUM,
 }
 
 

@@ -9,7 +9,7 @@ from cdtool.base.errors import UsageError
 from cdtool.base.plain_text import counted
 from cdtool.base.remote.remote_path import location
 from cdtool.commands.tune.tuned_rows import Tuning
-from cdtool.results.frames import notebook_table
+from cdtool.report.notebook import notebook_table
 
 _SHOWN = [
     "detector",
@@ -63,8 +63,9 @@ class TuningResult(Tuning):
         return list(write_tuning(self, target))
 
     def __repr__(self) -> str:
-        return f"TuningResult({counted(len(self.detectors), 'detector')}: {self.headline})"
+        return f"TuningResult({self.headline}; {counted(len(self.detectors), 'detector')})"
 
     def _repr_html_(self) -> str:
         """Return these results as a table, which a notebook shows."""
-        return notebook_table(f"Tuned: {self.headline}", self.summary()[_SHOWN])
+        tone, headline = self.verdict
+        return notebook_table(headline, self.summary()[_SHOWN], tone)

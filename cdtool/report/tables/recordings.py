@@ -195,8 +195,8 @@ def _outcome_cell(part: _Outcome, recording: RecordingResult, silent: bool) -> C
 def _contact_words(contacts: Sequence[ContactResult]) -> list[str]:
     if len(contacts) <= 3:
         return [", ".join(map(_contact_word, contacts))] if contacts else []
-    latencies = [item.latency_ms for item in contacts if item.latency_ms is not None]
-    slowest = f", slowest {number(max(latencies))}" if latencies else ""
+    latencies = {item.latency_ms: item for item in contacts if item.latency_ms is not None}
+    slowest = f", slowest {number(max(latencies), error=latencies[max(latencies)].resolution_ms)}" if latencies else ""
     return [f"{len(latencies)} of {len(contacts)} detected{slowest}"]
 
 
@@ -204,7 +204,8 @@ def _contact_word(item: ContactResult) -> str:
     """Return a latency, as a range if the load cell missed the beginning of the contact, or the outcome without one."""
     if item.latency_ms is not None:
         later = later_ms(item)
-        return f"{number(item.latency_ms)} to {number(item.latency_ms + later)}" if later else number(item.latency_ms)
+        longest = f" to {number(item.latency_ms + later, error=item.resolution_ms)}" if later else ""
+        return f"{number(item.latency_ms, error=item.resolution_ms)}{longest}"
     if item.in_progress:
         return "in progress at the start"
     return "missed" if item.outcome == "missed" else NOT_ASSESSABLE

@@ -109,15 +109,15 @@ def results_table(items: Sequence[Summary]) -> Table:
 
     Columns that no row fills are left out.
     """
-    contacts, latencies = any(item.contacts for item in items), latency_columns(items)
     fields: list[tuple[Heading, Callable[[Summary], Cell]]] = [
         (Heading("detector"), lambda item: name_cell(item.detector))
     ]
-    if contacts:
-        few = "range" in latencies
+    if any(item.contacts for item in items):
         fields += [
-            (Heading("median [ms]", numeric=True), _short_median),
-            (Heading("range [ms]" if few else "P95 [ms]", numeric=True), _range if few else _short_p95),
+            (Heading("median [ms]", numeric=True), lambda item: _short(item, item.median)),
+            (Heading("range [ms]", numeric=True), partial(latency_cell, "range"))
+            if "range" in latency_columns(items)
+            else (Heading("P95 [ms]", numeric=True), lambda item: _short(item, item.p95)),
             (Heading(MISSED, numeric=True, choice=True), _short_missed),
         ]
     fields.append((Heading(FALSE_ALARMS, numeric=True, choice=True), _short_false_alarms))
@@ -180,7 +180,7 @@ def _of_contacts(items: Sequence[Summary]) -> list[tuple[Heading, Callable[[Summ
     fields: list[tuple[Heading, Callable[[Summary], Cell]]] = []
     if any(item.contacts for item in items):
         fields += [
-            *((Heading(f"{name} [ms]", numeric=True), partial(_latency, name)) for name in latency_columns(items)),
+            *((Heading(f"{name} [ms]", numeric=True), partial(latency_cell, name)) for name in latency_columns(items)),
             (Heading("contacts detected", numeric=True), _detected),
             (Heading("missed", numeric=True), _missed),
             (Heading("not assessable", numeric=True), _not_assessable),
@@ -247,28 +247,20 @@ def calibration_table(results: Results) -> Table:
     return tabulate("calibration", "False-alarm budget", fields, results.calibration, "calibration")
 
 
-def _latency(column: LatencyColumn, item: Summary) -> Cell:
-    if column == "range":
-        return _range(item)
-    interval = latency_interval(item, column)
-    return empty_cell() if interval is None else interval_cell(interval)
-
-
-def _range(item: Summary) -> Cell:
-    """Return the shortest and the longest latency, sorted by the longer."""
-    ends = dict.fromkeys((number(item.min_ms), number(item.max_ms)))
+def latency_cell(column: LatencyColumn, item: Summary) -> Cell:
+    """Return a column of the latency; the range is sorted by its longer end."""
+    if column != "range":
+        interval = latency_interval(item, column)
+        return empty_cell() if interval is None else interval_cell(interval, item.resolution_ms)
+    ends = dict.fromkeys(number(end, error=item.resolution_ms) for end in (item.min_ms, item.max_ms))
     return Cell(" to ".join(ends), key=key_of(item.max_ms))
 
 
-def _short_p95(item: Summary) -> Cell:
-    return number_cell(item.p95.value)
-
-
-def _short_median(item: Summary) -> Cell:
-    """Return the median; its interval only if there is one."""
-    if math.isnan(item.median.low) or math.isnan(item.median.high):
-        return number_cell(item.median.value)
-    return interval_cell(item.median)
+def _short(item: Summary, interval: Interval) -> Cell:
+    """Return a latency; its interval only if there is one."""
+    if math.isnan(interval.low) or math.isnan(interval.high):
+        return number_cell(interval.value, item.resolution_ms)
+    return interval_cell(interval, item.resolution_ms)
 
 
 def _short_missed(item: Summary) -> Cell:

@@ -20,7 +20,7 @@ class Contacts(Writer[Report]):
     name: ClassVar[str] = "contacts"
     suffixes: ClassVar[tuple[str, ...]] = (".csv",)
     in_folder: ClassVar[str] = "contacts.csv"
-    kinds: ClassVar[dict[str, Kind]] = {".csv": Kind(b"recording,group,", "table of cdtool")}
+    kinds: ClassVar[dict[str, Kind]] = {".csv": Kind(b"force_at_alarm_n", "table of cdtool")}
 
     def write(self, report: Report, target: Path) -> None:
         """Write it; raises CdtoolError."""
@@ -30,4 +30,4 @@ class Contacts(Writer[Report]):
 def contacts_lines(results: Results) -> Iterator[str]:
     """Yield a row per contact and detector, in the order and under the names of results.json; empty = no value."""
     names = [item.name for item in fields(ContactResult)]
-    return csv_lines(names, ([getattr(contact, name) for name in names] for contact in results.contacts))
+    return csv_lines(results, names, ([getattr(contact, name) for name in names] for contact in results.contacts))

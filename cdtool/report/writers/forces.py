@@ -22,7 +22,7 @@ class Forces(Writer[Report]):
 
     name: ClassVar[str] = "forces"
     in_folder: ClassVar[str] = "forces.csv"
-    kinds: ClassVar[dict[str, Kind]] = {".csv": Kind(b"recording,group,", "table of cdtool")}
+    kinds: ClassVar[dict[str, Kind]] = {".csv": Kind(b"step_time_budget_ms", "table of cdtool")}
 
     def has_content(self, report: Report) -> bool:
         """Return whether any force was compared with a limit."""
@@ -40,4 +40,4 @@ def forces_lines(results: Results) -> Iterator[str]:
         for force in results.forces
         for step in force.steps
     )
-    return csv_lines(_NAMES, rows)
+    return csv_lines(results, _NAMES, rows)

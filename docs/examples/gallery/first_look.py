@@ -42,4 +42,4 @@ found.contacts[["onset_s", "alarm_s", "latency_ms", "outcome", "peak_force_n"]]
 
 # %% [markdown]
 # The load cell shows one contact, and the momentum observer notices it. Limits that were learned from impact-free
-# runs are closer to the signal: [Learn and detect](learn_and_detect.md).
+# runs are closer to the signal: [the notebook](../examples/gate.ipynb).

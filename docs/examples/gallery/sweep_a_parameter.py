@@ -28,12 +28,12 @@ for bandwidth in (10.0, 20.0, 40.0, 80.0, 160.0):
     learned = cdtool.learn_signature(free, machine, observer)
     found = cdtool.detect(logs, machine, signature=learned, detector=observer)
     kind = found.contacts.recording.str.split("/").str[-2].rename("kind")
-    swept[bandwidth] = found.contacts.latency_ms.groupby(kind).mean()
+    swept[bandwidth] = found.contacts.latency_ms.groupby(kind).median()
 sweep = pd.DataFrame(swept).T.rename_axis("bandwidth [rad/s]")
 sweep
 
 # %%
-axes = sweep.plot(marker="o", ylabel="mean latency [ms]", figsize=(7, 3))
+axes = sweep.plot(marker="o", ylabel="median latency [ms]", figsize=(7, 3))
 axes.set_ylim(bottom=0)
 
 # %% [markdown]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import cdtool
 
-cdtool.simulate_gate(Path("gate"), {"free": 25, "holdout": 2, "stiff": 5, "soft": 5}, seed=5)
+cdtool.simulate_gate(Path("gate"), {"free": 25, "holdout": 2, "stiff": 10, "soft": 10}, seed=5)
 tried = {"tune.thresholds": ["limit", "signature"]}
 tuned = cdtool.tune("gate/benchmark.toml", "1/10op", detectors=["gm"], settings=tried)
 tuned.summary()

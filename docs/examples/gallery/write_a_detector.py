@@ -64,5 +64,5 @@ found.contacts[["recording", "outcome", "latency_ms"]]
 found[2].plot()
 
 # %% [markdown]
-# It is beaten by most others: compare it with the momentum observer in [Compare detectors](compare_detectors.md). The
+# It is beaten by most others: compare it with those of [the notebook](../examples/gate.ipynb). The
 # [recipe](../recipes.md#add-a-detector) describes the contract, and the tests that show whether a detector keeps it.

@@ -101,22 +101,22 @@ def shown(capsys: pytest.CaptureFixture[str], latencies: Mapping[str, Sequence[f
 
 def test_four_contacts_show_median_and_range_and_no_mean(capsys):
     lines = shown(capsys, {"momentum": [25.0, 27.0, 28.0, 28.5]})
-    assert "stiff momentum 27.5 25 to 28.5 4 0 0 0 4" in lines
+    assert "stiff momentum 27.5 25.0 to 28.5 4 0 0 0 4" in lines
     assert not any("mean ms" in line or "P95 ms" in line for line in lines[:2])
     assert any(line.startswith("Fewer than 10 contacts detected: median and range") for line in lines)
 
 
 def test_a_missed_contact_counts_as_later_than_the_range(capsys):
     lines = shown(capsys, {"momentum": [25.0, 27.0, 28.0, None], "direct": [None, None]})
-    assert "stiff momentum 27.5 25 to not reached 3 1 0 0 4" in lines
+    assert "stiff momentum 27.5 25.0 to not reached 3 1 0 0 4" in lines
     assert "stiff direct not reached not reached 0 2 0 0 4" in lines
 
 
 def test_ten_contacts_show_the_mean_with_its_interval_next_to_a_small_group(capsys):
     lines = shown(capsys, {"momentum": [25.0 + i for i in range(10)], "direct": [25.0, 27.0]})
     many = next(line for line in lines if line.startswith("stiff momentum"))
-    assert many.startswith("stiff momentum 29.5 (") and "25 to 34" in many
-    assert "stiff direct - - 26 25 to 27 - 2 0 0 0 4" in lines
+    assert many.startswith("stiff momentum 29.5 (") and "25.0 to 34.0" in many
+    assert "stiff direct - - 26.0 25.0 to 27.0 - 2 0 0 0 4" in lines
     alone = shown(capsys, {"momentum": [25.0 + i for i in range(10)]})
     assert not any("range" in line and "ms" in line for line in alone[:2])
     assert not any(line.startswith("Fewer than 10") for line in alone)

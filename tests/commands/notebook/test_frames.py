@@ -12,8 +12,10 @@ import pytest
 
 import cdtool
 from cdtool.base.errors import UsageError
+from cdtool.report.tables.results import results_table
 from cdtool.results.evaluated import evaluate
 from cdtool.results.results import ContactResult, ExposureResult, FalseAlarmResult, Results, tables
+from cdtool.results.summary import FIGURES
 from tests.commands.notebook.values import FREE, GATE, LOG, MACHINE
 
 EMPTY = cdtool.BenchmarkResult(
@@ -35,8 +37,9 @@ def found():
     ("name", "kind"), [("contacts", ContactResult), ("false_alarms", FalseAlarmResult), ("exposure", ExposureResult)]
 )
 def test_a_frame_has_the_fields_of_the_results_file_with_and_without_rows(result, name, kind):
-    full, empty = getattr(result, name), getattr(EMPTY, name)
+    full, empty = result.frame(name), EMPTY.frame(name)
     names = [item.name for item in dataclasses.fields(kind)]
+    assert set(getattr(result, name)) <= set(names)
     assert full.columns.tolist() == empty.columns.tolist() == names
     assert len(full) == len(getattr(result.results, name)) and len(empty) == 0
     assert [str(kind) for kind in full.dtypes] == [str(kind) for kind in empty.dtypes]
@@ -51,7 +54,7 @@ def test_every_table_of_the_results_has_a_frame(result):
 
 
 def test_the_columns_are_typed_and_hold_the_values_of_the_rows(result):
-    frame, rows = result.contacts, result.results.contacts
+    frame, rows = result.frame("contacts"), result.results.contacts
     kinds = {name: str(frame[name].dtype) for name in ("recording", "detector", "outcome", "latency_ms", "contact")}
     assert kinds == {
         "recording": "string", "detector": "category", "outcome": "category", "latency_ms": "float64",
@@ -61,6 +64,15 @@ def test_the_columns_are_typed_and_hold_the_values_of_the_rows(result):
     for name in ("recording", "detector", "latency_ms", "outcome", "side", "reason"):
         shown = [None if pd.isna(value) else value for value in frame[name]]
         assert shown == [getattr(row, name) for row in rows], name
+
+
+def test_few_contacts_have_median_and_range_and_no_mean_as_in_the_reports(result):
+    row = result.summary().loc[("stiff", "momentum")]
+    assert row[["median_ms", "min_ms", "max_ms"]].notna().all() and row[["mean_ms", "p95_ms"]].isna().all()
+    every = result.summary(every=True)
+    assert set(FIGURES) <= set(every) and every.columns[: len(row)].tolist() == row.index.tolist()
+    table = results_table(result.evaluated.summaries)
+    assert all(cell.line in result._repr_html_() for line in table.rows for cell in line)
 
 
 def test_a_recording_becomes_a_frame_with_the_names_of_convert(tmp_path):

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import pydoc
+import re
 from dataclasses import replace
+from types import FunctionType
 
 import pytest
 from matplotlib.figure import Figure
 
 import cdtool
 from cdtool.base.errors import UsageError
-from tests.commands.notebook.values import FREE, GATE, LOG, MACHINE, returned_values
+from tests.commands.notebook.values import FREE, GATE, LOG, MACHINE, ROOT, returned_values
 
 LONGEST = 200
 
@@ -26,6 +29,18 @@ def faults_of(value: object) -> str:
     return f"{type(value).__name__}: {len(text)} characters" if len(text) > LONGEST else ""
 
 
+def test_the_package_has_the_api_only_and_help_shows_each_function_by_its_name():
+    names = set(cdtool.__all__)
+    assert set(dir(cdtool)) == names and not names & {"commands", "report", "results", "annotations"}
+    text = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+    for name in names - {"__version__"}:
+        value = getattr(cdtool, name)
+        assert value.__name__ == name and value.__doc__, name
+        if isinstance(value, FunctionType):
+            assert re.search(rf"^{name}\(", pydoc.render_doc(value, renderer=pydoc.plaintext), re.MULTILINE), name
+            assert re.search(rf"`(cdtool\.)?{name}\b|cdtool\.{name}\(", text), name
+
+
 def test_the_repr_of_what_a_function_returns_is_one_short_line(returned):
     assert not [fault for fault in map(faults_of, returned.values()) if fault]
 
@@ -33,7 +48,7 @@ def test_the_repr_of_what_a_function_returns_is_one_short_line(returned):
 @pytest.mark.parametrize("name", ["detect", "detect of many", "benchmark", "score"])
 def test_a_notebook_shows_a_small_table_below_a_line(returned, name):
     text = returned[name]._repr_html_()
-    assert text.startswith("<p>") and text.count("<table") == text.count("</table>") == 1
+    assert text.startswith("<p style=") and text.count("<table") == text.count("</table>") == 1
     assert len(text) < 6000
 
 

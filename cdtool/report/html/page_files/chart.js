@@ -24,10 +24,10 @@ function make(parent, name, attributes = {}, words = null) {
   return element;
 }
 
-/** Give an element a detector's colour; the style sheet lightens it on a dark page. */
+/** Give an element a detector's look. */
 function tint(element, detector) {
   element.classList.add("detector");
-  element.style.setProperty("--colour", detector.colour);
+  for (const name of ["colour", "dark", "dashes"]) if (detector[name]) element.style.setProperty(`--${name}`, detector[name]);
   return element;
 }
 
