@@ -1,8 +1,8 @@
 """Each group of a benchmark in a sentence: the best detector, its latency, and what its zeros can mean at most.
 
 Conventions: best is who has the fewest contacts missed or not assessable, then the fewest false alarms in all groups,
-then the least median as it is shown; equal ones are named together. Whether that difference is more than chance is told
-by the comparisons of pairs.
+then the least median as it is shown; equal ones are named together. Whether that difference is more than chance is known
+from the comparisons of pairs.
 """
 
 from __future__ import annotations
@@ -100,7 +100,8 @@ def _evidence(evaluated: Evaluated, first: Summary, equal: Sequence[str]) -> str
         return f"{words}; {counted(first.assessable, 'contact', 'are')} too few to show a difference"
     if alike:
         return f"{words}; not shown to be better than {_named(list(alike))}"
-    return words or (f"; shown to be better than {_named(list(others))}" if others else "")
+    every = f"all {len(others)} others" if len(others) > 1 else _named(list(others))
+    return words or (f"; shown to be better than {every}" if others else "")
 
 
 def _of_false_alarms(items: Sequence[Summary]) -> str:
@@ -128,5 +129,4 @@ def _of_false_alarms(items: Sequence[Summary]) -> str:
 def _named(detectors: Sequence[str]) -> str:
     names = [shown(name) for name in detectors[:NAMED]]
     names += [f"{len(detectors) - NAMED} more"] if len(detectors) > NAMED else []
-    *most, last = names
-    return f"{', '.join(most)} and {last}" if most else last
+    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))

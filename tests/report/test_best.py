@@ -71,7 +71,7 @@ def test_a_sentence_says_how_sure_its_choice_is(first, second, alarms, end):
     assert told(results_of(first, second, alarms))["stiff"].endswith(end)
 
 
-def test_a_group_without_contacts_tells_the_false_alarms_with_their_bounds():
+def test_a_group_without_contacts_has_its_false_alarms_with_their_bounds():
     quiet, loud = told(results_of(FAST, SLOW)), told(results_of(FAST, SLOW, 2, hours=2.0))
     most = "in 20 operations (at most 0.150 per operation"
     assert quiet["holdout"] == f"no contacts; no false alarm of any detector {most})"

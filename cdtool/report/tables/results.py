@@ -105,7 +105,7 @@ def required(limit: LimitResult) -> str:
 
 
 def results_table(items: Sequence[Summary]) -> Table:
-    """Return the results in at most six columns, a part for each group; what is equal in all of its rows is said once.
+    """Return the results in at most six columns, a part for each group; what all of its rows share is in its heading.
 
     Columns that no row fills are left out.
     """
