@@ -121,7 +121,9 @@ def _draw(axes: Axes, item: Repetition, scales: tuple[_Scale, _Scale], words: Wo
     time, force = scales
     steps, end = [step.step for step in item.verdict.steps], float(time.nodes[-1])
     limits = [step.at_most_n for step in steps]
-    time.set(axes, "x", time.nodes.tolist(), words)
+    time.set(
+        axes, "x", time.nodes.tolist() if len(steps) > 1 else np.arange(0.0, end, math.ceil(end / 6.0)).tolist(), words
+    )
     force.set(axes, "y", [0.0, *limits], words)
     if len(force.nodes) > 2:
         axes.axhspan(force.nodes[0], force.nodes[-2], color=_EXPANDED, linewidth=0)
