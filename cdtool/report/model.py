@@ -79,7 +79,7 @@ _NOTES = {
     ),
     "amoc": (
         "Each point is a safety factor; the ringed point is in use. False alarms are those of the impact-free "
-        "operations. Left of the line there is no false alarm; this does not mean a rate of zero, and the upper bound "
+        "operations. The strip 0 has the points without any; this does not mean a rate of zero, and the upper bound "
         "is given below. Open points: contacts were missed. A triangle at the top: the median is not reached."
     ),
     "comparisons": (

@@ -291,7 +291,9 @@ class BenchmarkPlots:
             hint = nearest(asked, tuple(known)) if known else "run the benchmark, or keep results.traces.json.gz"
             raise UsageError(f"no curves of '{asked}' were kept" if asked else "no curves were kept", hint)
         trace = most_informative(found)
-        return described(trigger_figure(trace), f"{trace.recording}: load cell and all detectors over time")
+        return described(
+            trigger_figure(trace, self.result.results), f"{trace.recording}: load cell and all detectors over time"
+        )
 
 
 def _names_of(trace: Trace) -> tuple[str, str]:

@@ -14,6 +14,7 @@ from cdtool.report.html.plots import plot_data, traces_of
 from cdtool.report.html.self_contained import content_policy, page_part, page_template, script_json, style_sheet
 from cdtool.report.html.traces import plot_height, trace_data
 from cdtool.report.model import NO_CERTIFICATE, TITLES, TITLES_OF_MANY
+from cdtool.report.plots.trace_words import LatencyTexts
 from cdtool.report.table import Log
 from cdtool.report.tables.attention import failed_traces
 from cdtool.report.writers.base import Report
@@ -52,7 +53,7 @@ def to_html(report: Report) -> str:
     style, script = style_sheet(), "\n".join(page_part(name) for name in _SCRIPTS)
     of_logs, numbers = traces_of(traces), {name: i for i, name in enumerate(results.detectors)}
     tables = {name: PageTable(model.tables[name], of_logs) if name in model.tables else None for name in _TABLES}
-    plots = plot_data(report)
+    plots, texts = plot_data(report), LatencyTexts.of(results)
     failed = failed_traces(model.failed, traces, of_logs)
     paged = [table.values() for table in tables.values() if table and table.paged]
     return page_template(_TEMPLATE).render(
@@ -60,7 +61,7 @@ def to_html(report: Report) -> str:
         style=Markup(style),
         script=Markup(script),
         data=script_json({**plots, "tables": paged, "failed": failed}),
-        traces=[script_json(trace_data(trace, numbers)) for trace in traces],
+        traces=[script_json(trace_data(trace, numbers, texts)) for trace in traces],
         trace_height=plot_height(traces[0]) if traces else 0,
         kept=f"{counted(len(traces), 'trigger plot')} of {counted(len(results.recordings), 'recording')}",
         printed=_printed(model.failed, of_logs),

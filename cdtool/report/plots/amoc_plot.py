@@ -18,15 +18,13 @@ from cdtool.report.number_text import NOTHING, number
 from cdtool.report.plots.figures import (
     between,
     drawing,
-    label,
     message_figure,
     save,
     write,
 )
-from cdtool.report.plots.labels import Labelled, write_labels
 from cdtool.report.plots.latency_axis import FLOOR_MS, LatencyAxis
-from cdtool.report.plots.side_table import NAME_LENGTH, SideColumn, SideTable, keyed_panels
-from cdtool.report.plots.style import BAND, look_of
+from cdtool.report.plots.side_table import SideColumn, SideTable, keyed_panels
+from cdtool.report.plots.style import BAND, line_of, look_of
 from cdtool.report.writers.base import Image, Report
 from cdtool.results.curves.amoc import AmocCurve, amoc_curves
 from cdtool.results.evaluated import Evaluated
@@ -62,7 +60,7 @@ def amoc_figure(evaluated: Evaluated) -> Figure:
     scale = amoc_axis(curves)
     for axes, group in zip(panels, groups, strict=True):
         strip = _strip_of(axes, names)
-        scale.set(axes.yaxis)
+        scale.set(axes, "y")
         # Room above the highest point for an arrow.
         axes.set_ylim(scale.low, (1.3 if scale.logarithmic else 1.08) * scale.high)
         axes.grid(color="0.9", linewidth=0.6)
@@ -72,7 +70,6 @@ def amoc_figure(evaluated: Evaluated) -> Figure:
             column = np.full(len(quiet), float(names.index(item.detector)))
             _draw_points(strip, item, column, quiet, scale)
             _draw_points(axes, item, _rates(item), ~quiet, scale)
-        _name_curves(axes, shown, scale)
         by_name = {item.detector: item for item in shown}
         for i, row in enumerate(rows[group]):
             _write_row(table, axes, i, row, by_name.get(row.detector))
@@ -113,7 +110,7 @@ def _draw_points(axes: Axes, item: AmocCurve, x: FloatArray, kept: np.ndarray, s
     """Draw the points of a curve that are `kept`, at `x`; an arrow leaves the last one whose median is reached."""
     look, y = look_of(item.detector), _heights(item, scale)
     line = np.where(np.isfinite(y), y, np.nan)[kept]
-    axes.plot(x[kept], line, color=look.colour, linestyle=(0, look.dashes or None), linewidth=1.2, zorder=3)
+    axes.plot(x[kept], line, **line_of(look), linewidth=1.2, zorder=3)
     missed = np.array([point.missed > 0 for point in item.points])
     for open_mark in (False, True):
         marked = kept & (missed == open_mark) & np.isfinite(y)
@@ -158,19 +155,6 @@ def _arrow(colour: str) -> dict[str, object]:
     return {"arrowstyle": "<-", "color": colour, "linewidth": 1.0, "shrinkA": 0, "shrinkB": 0}
 
 
-def _name_curves(axes: Axes, curves: Sequence[AmocCurve], scale: LatencyAxis) -> None:
-    """Write the names of curves next to their rates, low ones first."""
-    named = []
-    for item in curves:
-        x, y = _rates(item), _heights(item, scale)
-        seen = np.isfinite(y) & (x > 0.0)
-        if seen.any():
-            places = np.arange(int(seen.sum()))[::-1]
-            look = look_of(item.detector)
-            named.append(Labelled(label(item.detector, NAME_LENGTH), look.colour, x[seen], y[seen], places))
-    write_labels(axes, named)
-
-
 def _write_row(table: SideTable, axes: Axes, place: int, row: Summary, curve: AmocCurve | None) -> None:
     if curve is None:
         cells = (NOTHING, NOTHING, NOTHING, str(row.not_assessable), NOTHING)
@@ -179,7 +163,7 @@ def _write_row(table: SideTable, axes: Axes, place: int, row: Summary, curve: Am
     point = curve.set_point
     cells = (
         number(point.safety_factor),
-        number(point.median),
+        number(point.median, error=row.resolution_ms),
         f"{point.missed} of {point.detected + point.missed}",
         str(curve.not_assessable),
         f"{point.false_alarms} in {curve.operations} op.",

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from cdtool.base.arrays import FloatArray
 
 if TYPE_CHECKING:
-    from matplotlib.axis import Axis
+    from matplotlib.axes import Axes
 
 # The lower end of a logarithmic axis [ms].
 FLOOR_MS = 1.0
@@ -53,12 +53,13 @@ class LatencyAxis:
         """The end of the axis [ms]."""
         return self.ticks[-1]
 
-    def set(self, axis: Axis) -> None:
+    def set(self, axes: Axes, which: Literal["x", "y"]) -> None:
         """Set scale and ticks of an axis of a figure, not its ends: there may be more room than for latencies."""
         from matplotlib.ticker import FixedLocator, NullLocator
 
         if self.logarithmic:
-            axis.axes.set(**{f"{axis.axis_name}scale": "log"})
+            axes.set(**{f"{which}scale": "log"})
+        axis = axes.xaxis if which == "x" else axes.yaxis
         axis.set_major_locator(FixedLocator(self.ticks))
         axis.set_minor_locator(NullLocator())
         axis.set_major_formatter(lambda value, _: f"{value:g}")

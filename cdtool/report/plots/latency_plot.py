@@ -87,13 +87,13 @@ def latency_figure(evaluated: Evaluated) -> Figure:
     table = SideTable((*_COLUMNS, *more))
     rows = {group: [item for item in summaries if item.group == group] for group in groups}
     names = [label(item.detector, 28) for item in summaries]
-    axis = _axis_of(list(marks.values()))
+    axis = _axis_of(list(marks.values()), evaluated.results)
     explained = _explained(summaries, list(marks.values()), axis)
     bottom = 0.325 + 0.175 * len(explained.splitlines())
     margins = Margins(text_width(names, 9) + 0.15, table.width + 0.1, 0.5, bottom)
     heights = [0.2 + 0.36 * len(rows[group]) for group in groups]
     figure, panels = stacked_panels(margins.left + 4.4 + margins.right, heights, margins, gap=0.36)
-    axis.scale.set(panels[-1].xaxis)
+    axis.scale.set(panels[-1], "x")
     panels[-1].set_xlim(axis.scale.low, axis.high)
     counts = {(item.detector, item.group): _count(item) for item in evaluated.summaries}
     for axes, group in zip(panels, groups, strict=True):
@@ -118,10 +118,16 @@ def _all_marks(results: Results) -> dict[tuple[str, str], _Marks]:
     return {key: _Marks(np.sort(detected), np.sort(missed)) for key, (detected, missed) in found.items()}
 
 
-def _axis_of(marks: Sequence[_Marks]) -> _Axis:
-    detected = np.concatenate([item.detected for item in marks])
+def latency_axis(results: Results) -> LatencyAxis:
+    """Return the axis of all latencies; if there are none, of the times for which missed contacts were monitored."""
+    rows = results.scored_contacts
+    late = [row.latency_ms for row in rows if row.latency_ms is not None]
+    return LatencyAxis.of(np.array(late or [row.watched_ms or 0.0 for row in rows if row.outcome == "missed"]))
+
+
+def _axis_of(marks: Sequence[_Marks], results: Results) -> _Axis:
     missed = np.concatenate([item.missed for item in marks])
-    scale = LatencyAxis.of(detected if len(detected) else missed)
+    scale = latency_axis(results)
     low, end = scale.low, scale.high
     if not np.any(missed > end):
         return _Axis(scale, end)
@@ -196,7 +202,7 @@ def _draw_median(axes: Axes, row: int, summary: Summary, axis: _Axis) -> None:
 
 def _write_open_end(axes: Axes, height: float, ends: tuple[float, float], words: str, axis: _Axis) -> None:
     """Draw an open interval from its lower end to the median and write it there; in the right half, left of both."""
-    low, high = axis.shown(ends[0]), axis.shown(ends[1] if np.isfinite(ends[1]) else ends[0])
+    low, high = axis.shown(np.array([ends[0], ends[1] if np.isfinite(ends[1]) else ends[0]])).tolist()
     axes.plot([low, low], [height - 0.1, height + 0.1], color="black", linewidth=1.0, zorder=3)
     axes.plot([low, high], [height, height], color="black", linewidth=1.4, solid_capstyle="butt", zorder=3)
     share = axes.transAxes.inverted().transform(axes.transData.transform((high, 0.0)))[0]

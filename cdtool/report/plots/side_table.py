@@ -10,7 +10,7 @@ import numpy as np
 
 from cdtool.report.number_text import NOTHING
 from cdtool.report.plots.figures import Margins, label, stacked_panels, text_width, write
-from cdtool.report.plots.style import look_of
+from cdtool.report.plots.style import line_of, look_of
 from cdtool.results.summary import Summary
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # Height of a line, and how far the names of detectors are moved in [points], chosen by eye.
-_ROW, _INDENT = 12.5, 26.0
+_ROW, _INDENT = 12.5, 30.0
 # A detector's name is cut to this length.
 NAME_LENGTH = 24
 
@@ -68,17 +68,13 @@ class SideTable:
     def write_key(self, axes: Axes, row: int, detector: str, cells: Sequence[str], loud: Sequence[bool]) -> None:
         """Write a row counted from the panel's upper edge: the detector's mark and name, then the cells."""
         from matplotlib.lines import Line2D
-        from matplotlib.transforms import ScaledTranslation
 
-        lift = -_ROW * (row + 0.5)
-        look, figure = look_of(detector), axes.figure
-        inches = np.array([0.0, 0.5, 0.92]) * _INDENT / 72.0 + self.gap / 72.0
+        lift, look, points = -_ROW * (row + 0.5), look_of(detector), 72.0 / axes.figure.dpi * np.asarray(axes.bbox.size)
         mark = Line2D(
-            inches,
-            np.full(3, lift / 72.0),
-            transform=figure.dpi_scale_trans + ScaledTranslation(1.0, 1.0, axes.transAxes),
-            color=look.colour,
-            linestyle=(0, look.dashes or None),
+            1.0 + (self.gap + np.array([0.0, 0.45, 0.9]) * _INDENT) / points[0],
+            np.full(3, 1.0 + lift / points[1]),
+            transform=axes.transAxes,
+            **line_of(look),
             linewidth=1.5,
             marker=look.marker,
             markevery=[1],

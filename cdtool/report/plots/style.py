@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from typing import Any
 from zlib import crc32
 
 from cdtool.base.errors import CdtoolError
@@ -16,6 +17,7 @@ _COMMON = {"band": "#DCE6EE", "limit": "#404040", "not-assessed": "#808080", "wo
 _COMMON_DARK = {"band": "#263746", "limit": "#B9C0C7", "not-assessed": "#7D8792", "worst": "#FF7FA5"}
 BAND, LIMIT, NOT_ASSESSED, WORST = _COMMON.values()
 ONSET_DASHES = (0, (6, 2, 1.5, 2))
+LIMIT_LINE: dict[str, Any] = {"color": LIMIT, "linestyle": (0, (4, 2)), "linewidth": 1.0}
 # Why a sample is not assessable; distinct without colour.
 HATCHES = {
     Status.START_UP: "////",
@@ -40,6 +42,11 @@ def look_of(detector: str) -> Look:
         with suppress(CdtoolError):
             look = getattr(DETECTORS.load(detector), "look", None)
     return look or _OTHERS[crc32(detector.encode("utf-8", "replace")) % len(_OTHERS)]
+
+
+def line_of(look: Look) -> dict[str, Any]:
+    """Return colour and dashes of a detector's curve in a figure."""
+    return {"color": look.colour, "linestyle": (0, look.dashes or None)}
 
 
 def page_look(detector: str) -> dict[str, str]:

@@ -13,7 +13,7 @@ from cdtool.report.number_text import number
 from cdtool.report.plots.figures import drawing, message_figure, save
 from cdtool.report.plots.latency_axis import LatencyAxis
 from cdtool.report.plots.side_table import SideColumn, count_cells, keyed_panels
-from cdtool.report.plots.style import look_of
+from cdtool.report.plots.style import line_of, look_of
 from cdtool.report.writers.base import Image, Report
 from cdtool.results.curves.survival_curves import SurvivalCurve, survival_curves
 from cdtool.results.evaluated import Evaluated
@@ -46,20 +46,22 @@ def survival_figure(evaluated: Evaluated) -> Figure:
     of_contacts = grouped([item for item in evaluated.summaries if item.contacts], "group")
     figure, panels, table = keyed_panels(of_contacts, _FIGURES, (4.6, 1.75), bottom=0.7)
     scale = survival_axis(curves)
-    scale.set(panels[-1].xaxis)
+    scale.set(panels[-1], "x")
     for axes, (group, items) in zip(panels, panels_of.items(), strict=True):
         _draw_group(axes, items, scale)
         for place, row in enumerate(of_contacts[group]):
             cells, loud = count_cells(row)
-            table.write_key(axes, place, row.detector, (number(row.median.value), *cells), (False, *loud))
+            table.write_key(
+                axes, place, row.detector, (number(row.median.value, error=row.resolution_ms), *cells), (False, *loud)
+            )
     panels[-1].set_xlabel(_explained(panels_of.values()), linespacing=1.4)
     return figure
 
 
 def survival_axis(curves: Sequence[SurvivalCurve]) -> LatencyAxis:
     """Return the axis of the times when contacts were detected and of the ends of monitoring."""
-    falls = [item.curve.times[1:][np.diff(item.curve.share) < 0.0] for item in curves]
-    return LatencyAxis.of(np.array([*np.concatenate(falls), *(item.end for item in curves if item.end > 0.0)]))
+    times = [item.curve.times[1:][np.diff(item.curve.share) < 0.0] for item in curves]
+    return LatencyAxis.of(np.concatenate([*times, [item.end for item in curves if item.end > 0.0]]))
 
 
 def _draw_group(axes: Axes, curves: Sequence[SurvivalCurve], scale: LatencyAxis) -> None:
@@ -85,9 +87,7 @@ def _draw_curve(axes: Axes, item: SurvivalCurve, low: float, *, banded: bool) ->
     # A logarithmic axis has no 0: the curve begins at its left edge.
     times = np.maximum(np.append(curve.times, item.end), low)
     share, below, above = (np.append(line, line[-1]) for line in (curve.share, curve.low, curve.high))
-    axes.step(
-        times, share, where="post", color=look.colour, linestyle=(0, look.dashes or None), linewidth=1.5, zorder=3
-    )
+    axes.step(times, share, where="post", **line_of(look), linewidth=1.5, zorder=3)
     if banded:
         axes.fill_between(times, below, above, step="post", color=look.colour, alpha=0.13, linewidth=0, zorder=1)
     falls = np.flatnonzero(np.diff(curve.share) < 0.0) + 1

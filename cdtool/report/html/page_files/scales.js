@@ -85,9 +85,15 @@ function ticksOf(low, high, most) {
   return { values: found, step };
 }
 
+/** The first tick at or beyond the highest value of an axis from 0 with about so many ticks. */
+function endOf(highest, most) {
+  const { step } = ticksOf(0, highest, most);
+  return Math.ceil(highest / step - 1e-9) * step;
+}
+
 /** Round numbers for a logarithmic axis; for a short one those of a linear axis. */
 function logTicksOf(low, high, most) {
-  for (const factors of [[1, 2, 3, 5, 7], [1, 2, 5], [1, 3], [1]]) {
+  for (const factors of [[1, 1.5, 2, 3, 5, 7], [1, 2, 3, 5, 7], [1, 2, 5], [1, 3], [1]]) {
     const found = [];
     for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power += 1) {
       for (const factor of factors) found.push(factor * 10 ** power);
