@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _IN_ROW = 4
 # Sizes [inch]: of a drawing, its margins, and the distance of two panels. Given, not found by trial, which takes a
 # second.
-_WIDTH, _HEIGHT, _LEFT, _TOP, _BELOW, _APART = 6.9, 1.85, 0.5, 0.27, 0.34, 0.16
+_WIDTH, _HEIGHT, _LEFT, _TOP, _BELOW, _APART = 6.9, 1.75, 0.5, 0.27, 0.34, 0.16
 _FONT = 7.0  # legible on paper [points]
 # The axis of the time ends at a multiple of this [s].
 _ROUNDED = 0.1
@@ -131,7 +131,7 @@ def _draw(axes: Axes, item: Repetition, scales: tuple[_PartedAxis, _PartedAxis],
         axes.axhline(node, color="white", linewidth=1.5)
     for begin in time.nodes[1:-1]:
         axes.axvline(begin, color="0.6", linewidth=0.7)
-    if item.curve.end < end - _ROUNDED:
+    if item.curve.end < end - 2.0 * _ROUNDED:
         axes.axvspan(item.curve.end, end, fill=False, edgecolor="0.6", hatch="////", linewidth=0)
     kept = kept_samples(axes.xaxis.get_transform().transform(item.curve.time), item.curve.force, 900)
     axes.plot(item.curve.time[kept], item.curve.force[kept], color=FORCE, linewidth=0.9)
