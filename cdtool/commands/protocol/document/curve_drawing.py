@@ -89,7 +89,7 @@ def curve_drawings(point: PointAssessment, words: Words, quantity: str = "curve"
                 alt.append(f"{title}: {', '.join(map(' '.join, compared))}")
             figure.axes[0].set_ylabel(words(f"{quantity}.axis"), fontsize=_FONT)
             key = "curve.time" if len(scales[0].nodes) == 2 else "curve.compressed"
-            figure.text(0.5, 0.01, words(key, begin=float(scales[0].nodes[1])), ha="center", fontsize=_FONT)
+            figure.text(0.5, 0.0, words(key, begin=float(scales[0].nodes[1])), ha="center", va="bottom", fontsize=_FONT)
         text = words(f"{quantity}.alt", point=plain(point.point.name), values="; ".join(alt))
         yield CurveDrawing(svg_text(figure), text)
 
