@@ -28,6 +28,7 @@ from cdtool.report.plots.figures import (
 from cdtool.report.plots.latency_axis import FLOOR_MS, LatencyAxis
 from cdtool.report.plots.side_table import SideColumn, SideTable, count_cells
 from cdtool.report.plots.style import look_of
+from cdtool.report.table import shown
 from cdtool.report.writers.base import Image, Report
 from cdtool.results.evaluated import Evaluated
 from cdtool.results.results import Results
@@ -83,7 +84,7 @@ def latency_figure(evaluated: Evaluated) -> Figure:
     known = _all_marks(evaluated.results)
     marks = {key: known[key] for key in ((item.detector, item.group) for item in summaries)}
     impact_free = list(dict.fromkeys(item.group for item in evaluated.summaries if not item.contacts))
-    more = [SideColumn(f"false alarms\nin {label(group, 11)}", 70.0) for group in impact_free]
+    more = [SideColumn(f"false alarms\nin {label(shown(group), 11)}", 70.0) for group in impact_free]
     table = SideTable((*_COLUMNS, *more))
     rows = {group: [item for item in summaries if item.group == group] for group in groups}
     names = [label(item.detector, 28) for item in summaries]
@@ -98,7 +99,7 @@ def latency_figure(evaluated: Evaluated) -> Figure:
     counts = {(item.detector, item.group): _count(item) for item in evaluated.summaries}
     for axes, group in zip(panels, groups, strict=True):
         _draw_group(axes, rows[group], marks, axis)
-        axes.set_title(label(group, 60), loc="left", fontweight="bold", y=1.0)
+        axes.set_title(label(shown(group), 60), loc="left", fontweight="bold", y=1.0)
         for i, row in enumerate(rows[group]):
             free = [counts.get((row.detector, name), NOTHING) for name in impact_free]
             _write_row(table, axes, i, row, free)

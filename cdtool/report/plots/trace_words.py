@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from cdtool.base.plain_text import counted
 from cdtool.report.number_text import number, spoken
 from cdtool.report.plots.panels import trigger_spans
+from cdtool.report.table import shown
 from cdtool.results.results import Results
 from cdtool.results.traces.trace import ContactOutcome, Panel, Span, Trace
 
@@ -77,7 +78,7 @@ def triggers_of(trace: Trace, row: Panel, span: Span) -> list[Span]:
 def trace_words(trace: Trace) -> list[str]:
     """Return group, contact and peak force of a trace."""
     contact = trace.shown
-    words = [trace.group]
+    words = [shown(trace.group)]
     if contact is None:
         words.append("no contact")
     elif len(trace.contacts) > 1:
