@@ -11,6 +11,7 @@ every broken link or anchor, and every file that a page would load from another 
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import re
 import runpy
@@ -23,6 +24,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
+
+from cdtool import benchmark
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
@@ -46,8 +49,10 @@ def stage(target: Path, source_url: str) -> None:
         shutil.copy(page, copy)
     (target / "_static").mkdir()
     shutil.copy(SITE / "style.css", target / "_static")
-    for name in ("conf.py", "search_order.js"):
-        shutil.copy(SITE / name, target)
+    shutil.copy(SITE / "conf.py", target)
+    order = (SITE / "search_order.js").read_text(encoding="utf-8")
+    (target / "search_order.js").write_text(f"var EXPLAINED = {json.dumps(_explained())};\n{order}", encoding="utf-8")
+    shutil.copy(SITE / "folds.js", target / "_static")
     (target / "_static" / "fonts").mkdir()
     fonts = Path(str(files("ziamath"))) / "fonts"
     shutil.copy(fonts / "STIXTwoMath-Regular.ttf", target / "_static" / "fonts")
@@ -56,6 +61,11 @@ def stage(target: Path, source_url: str) -> None:
         file = target / "docs" / f"{name}.md"
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(text, encoding="utf-8")
+    notebook = runpy.run_path(str(SITE / "notebook_page.py"))
+    for file in (DOCS / "examples").glob("*.ipynb"):
+        notebook["write_page"](file, target / "docs" / "examples" / f"{file.stem}.md")
+    (target / "_extra").mkdir()
+    benchmark(SAMPLES / "gate" / "benchmark.toml", jobs=2).save(target / "_extra" / "sample-report.html")
     with (SITE / "navigation.toml").open("rb") as file:
         add_navigation(target, tomllib.load(file))
     (target / "README.md").unlink()  # the front page takes its place
@@ -73,9 +83,9 @@ def add_navigation(target: Path, navigation: Mapping[str, Any]) -> None:
             names = part["pages"]
             shown = [*names, *part.get("also", ())]  # pages of another part are in the table, not below this one
             rows = "".join(f"| [{_title(target, name)}]({name}.md) | {known.get(name, '')} |\n" for name in shown)
-            text += [f"## {part['title']}\n", f"| page | contents |\n|---|---|\n{rows}", _toctree(names, part["title"])]
-        if section["name"] == "gallery":
-            text.append(_pictures(target))
+            is_gallery = section["name"] == "gallery"
+            table = _pictures(target) if is_gallery else f"| page | contents |\n|---|---|\n{rows}"
+            text += [f"## {part['title']}\n", table, _toctree(names, part["title"])]
         (target / "docs" / f"{section['name']}.md").write_text("\n".join(text), encoding="utf-8")
     for parent, patterns in navigation["below"].items():
         page = target / "docs" / f"{parent}.md"
@@ -123,6 +133,7 @@ def _descriptions() -> dict[str, str]:
         "../CONTRIBUTING": "set up, tests, code, language, and how to build this site",
         "../CHANGELOG": "what changed for users",
         "../sample_logs/README": "the recordings that come with cdtool: simulated ones, and those of a real robot",
+        "examples/gate": "a notebook: learn, detect, compare, with tables and figures",
         "index": "all pages in one list",
     }
     row = re.compile(r"^\| \[[^\]]*\]\(([\w/.-]+)\.md\) \| (.*) \|$", re.MULTILINE)
@@ -130,22 +141,32 @@ def _descriptions() -> dict[str, str]:
     return {**{f"gallery/{name}": about for name, about in examples}, **dict(row.findall(text)), **own}
 
 
+def _explained() -> dict[str, str]:
+    """Return the page that explains each word of the glossary: the one that its row links, or the glossary itself."""
+    text = (DOCS / "glossary.md").read_text(encoding="utf-8")
+    found = {}
+    for words, meaning in re.findall(r"^\| \*\*(.+?)\*\* \| (.*) \|$", text, re.MULTILINE):
+        link = re.search(r"\]\(([\w/-]+)\.md", meaning)
+        found |= dict.fromkeys(words.lower().split(", "), f"docs/{link[1] if link else 'glossary'}")
+    return found
+
+
 def _pictures(target: Path) -> str:
-    """Return every raster picture of the pages under the title of the first page that shows it, with its text."""
-    text = ["## Pictures\n"]
-    seen = set[Path]()
-    for page in sorted((target / "docs").rglob("*.md")):
-        name = page.relative_to(target / "docs").as_posix().removesuffix(".md")
-        shown = re.findall(r"!\[([^\]]*)\]\(([^)\s]+\.png)\)", page.read_text(encoding="utf-8"))
-        new = [(words, (page.parent / image).resolve()) for words, image in shown]
-        new = [(words, image) for words, image in new if image not in seen]
-        seen |= {image for _, image in new}
-        if new:
-            text.append(f"### {_title(target, name)}\n")
-            for words, image in new:
-                place = os.path.relpath(image, (target / "docs").resolve())
-                text.append(f"![{words}]({place})\n\n{words}: [{_title(target, name)}]({name}.md).\n")
-    return "\n".join(text)
+    """Return a card for every page with a raster picture: its title, a thumbnail, and where it has the others."""
+    cards = []
+    docs = target / "docs"
+    pages = [file.relative_to(docs).as_posix().removesuffix(".md") for file in sorted(docs.rglob("*.md"))]
+    pages.sort(key=lambda name: not name.startswith(("examples/", "gallery/")))
+    for name in pages:
+        shown = re.findall(r"!\[[^\]]*\]\(([^)\s]+\.png)\)", (docs / f"{name}.md").read_text(encoding="utf-8"))
+        if shown:
+            place = os.path.relpath((docs / name).parent.resolve() / shown[0], docs.resolve())
+            more = f"{len(shown)} pictures" if len(shown) > 1 else ""
+            cards.append(
+                f":::{{grid-item-card}} {_title(target, name)}\n:img-top: {place}\n:link: {name}\n:link-type: doc\n"
+                f":class-card: thumbnail\n{more}\n:::\n"
+            )
+    return "::::{grid} 1 2 3 4\n:gutter: 3\n\n" + "\n".join(cards) + "::::\n"
 
 
 def _with_links(page: Path, target: Path, source_url: str) -> str:
@@ -157,6 +178,8 @@ def _with_links(page: Path, target: Path, source_url: str) -> str:
             return match[0]
         file = (page.parent / place).resolve()
         inside = file.is_relative_to(target.resolve())
+        if file.suffix == ".ipynb":  # shown as a page
+            return f"{text}({place.removesuffix('.ipynb')}.md)"
         if (
             inside
             and (file.suffix in (".md", ".png", ".svg") or file.name == "results.schema.json")

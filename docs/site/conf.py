@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import sys
@@ -10,6 +11,7 @@ from typing import Any
 
 from docutils import nodes
 from docutils.utils.math import latex2mathml
+from sphinx import addnodes
 from sphinx.application import Sphinx
 from sphinx.errors import SphinxError
 
@@ -44,7 +46,10 @@ copybutton_prompt_is_regexp = True
 html_theme = "pydata_sphinx_theme"
 html_title = "cdtool"
 html_static_path = ["_static"]
+html_extra_path = ["_extra"]  # the sample report
 html_css_files = ["style.css"]
+html_js_files = ["folds.js"]
+html_use_index = False
 html_context = {"default_mode": "auto"}
 html_search_scorer = str(Path(__file__).parent / "search_order.js")
 html_copy_source = False
@@ -140,6 +145,55 @@ def separate_commands(app: Sphinx, tree: nodes.document, page: str) -> None:
         block["highlight_args"] = {**block.get("highlight_args", {}), "linespans": f"command{number}"}
 
 
+TALLEST = 4400  # of a page 1,400 px wide [px]; taller ones fold their longest sections
+
+
+def height(node: nodes.Node) -> float:
+    """Return about how tall a part of a page is [px]."""
+    if isinstance(node, nodes.paragraph | nodes.term):
+        return 18 + 27 * math.ceil(len(node.astext()) / 105) + 500 * len(list(node.findall(nodes.image)))
+    if isinstance(node, nodes.literal_block):
+        return 45 + 20 * (1 + node.astext().count("\n"))
+    if isinstance(node, nodes.row):
+        return 18 + 27 * math.ceil(len(node.astext()) / 60)
+    own = {nodes.title: 100, nodes.math_block: 90, addnodes.desc_signature: 70}
+    return next((size for kind, size in own.items() if isinstance(node, kind)), 0) or sum(map(height, node.children))
+
+
+def contents(hidden: list[nodes.Node]) -> str:
+    """Return in words what a fold hides."""
+    found = [part for node in hidden for part in node.findall()]
+    if any(isinstance(part, addnodes.desc) for part in found):
+        return "signature, parameters and examples"
+    kinds = {"table": nodes.table, "example": nodes.literal_block, "picture": nodes.image}
+    counts = {name: sum(isinstance(part, kind) for part in found) for name, kind in kinds.items()}
+    counts["paragraph"] = sum(
+        isinstance(part, nodes.paragraph) and not isinstance(part.parent, nodes.entry) for part in found
+    )
+    return ", ".join(f"{count} {name}{'s' * (count > 1)}" for name, count in counts.items() if count)
+
+
+def fold_sections(app: Sphinx, tree: nodes.document, page: str) -> None:
+    """Fold the longest sections of a tall page behind their first paragraph, until it is short enough."""
+    del app
+    (whole,) = [node for node in tree.children if isinstance(node, nodes.section)][:1] or [nodes.section()]
+    below = [node for node in whole.children if isinstance(node, nodes.section)]
+    if len(below) == 1:
+        below = [node for node in below[0].children if isinstance(node, nodes.section)]
+    total = 300 + height(tree)
+    for section in sorted(below, key=height, reverse=True):
+        first = 1 + isinstance(section.children[min(1, len(section.children) - 1)], nodes.paragraph)
+        hidden = section.children[first:]
+        if total < TALLEST or page == root_doc or not hidden:
+            break
+        section[first:] = [
+            nodes.raw("", f'<details class="fold"><summary>Show {contents(hidden)}</summary>', format="html"),
+            *hidden,
+            nodes.raw("", "</details>", format="html"),
+        ]
+        total -= sum(map(height, hidden)) - 45
+
+
 def setup(app: Sphinx) -> dict[str, bool]:
     """Register the renderer of equations, and the reader of docstrings before numpydoc's."""
     app.add_html_math_renderer(
@@ -149,6 +203,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     )
     app.connect("autodoc-process-docstring", plain_rst, priority=100)
     app.connect("doctree-resolved", separate_commands)
+    app.connect("doctree-resolved", fold_sections)
     app.connect("html-page-context", front_page_title)
     app.connect("html-page-context", picture_links)
     app.connect("html-page-context", whole_options)

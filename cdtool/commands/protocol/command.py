@@ -112,7 +112,7 @@ def write(
 
     Example: cdtool protocol write sample_logs/gate/protocol.toml -o protocol.html
     """
-    from cdtool.commands.protocol.document.document import ProtocolReport
+    from cdtool.commands.protocol.document.document import protocol_document
     from cdtool.commands.protocol.making import protocol as make
     from cdtool.report.outputs import check_outputs, write_outputs
 
@@ -121,7 +121,7 @@ def write(
     check_outputs(output, force=force, subject="protocol")
     names = [word for path in output for word in ("-o", path.name)]
     made = make(file, command=shlex.join(["cdtool", "protocol", "write", str(file), *names]))
-    write_outputs(ProtocolReport(made), output, force=force, inputs=(file,), subject="protocol")
+    write_outputs(protocol_document(made), output, force=force, inputs=(file,), subject="protocol")
     show_protocol(made, output)
     leave(facts=_FACTS[made.verdict.outcome])
 
