@@ -15,7 +15,7 @@ from cdtool.base.plain_text import counted
 from cdtool.recordings.recording import Recording
 from cdtool.report.explanation_words import words
 from cdtool.report.number_text import number
-from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label, write
+from cdtool.report.plots.figures import drawing, label, log_label, new_figure, save, unit_label, write
 from cdtool.report.plots.panels import (
     PIXELS,
     Legend,
@@ -77,7 +77,7 @@ def _figure(detection: Detection, item: Explanation) -> Figure:
     panels[-1].set_xlabel(f"time from {event} [ms]")
     count_from(panels[-1], item.zero, next((x for x in _STEPS if (span[1] - span[0]) / x <= 12), _STEPS[-1]))
     figure.align_ylabels()
-    heading = f"{label(item.operation, 60)}  ·  {label(item.detector)}  ·  {label(item.joint)}"
+    heading = f"{log_label(item.operation)}  ·  {label(item.detector)}  ·  {label(item.joint)}"
     figure.suptitle(f"{heading}\n{fill(label(words(item)[0], 200), 110)}", fontsize=10, x=0.01, ha="left")
     figure.legend(handles=[*legend.handles(), *_more_handles(item, channels)], loc="outside lower left", ncols=4)
     return figure

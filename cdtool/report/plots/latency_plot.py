@@ -88,7 +88,7 @@ def latency_figure(evaluated: Evaluated) -> Figure:
     table = SideTable((*_COLUMNS, *more))
     rows = {group: [item for item in summaries if item.group == group] for group in groups}
     names = [label(item.detector, 28) for item in summaries]
-    axis = _axis_of(list(marks.values()), evaluated.results)
+    axis = _axis_of(evaluated.results)
     explained = _explained(summaries, list(marks.values()), axis)
     bottom = 0.325 + 0.175 * len(explained.splitlines())
     margins = Margins(text_width(names, 9) + 0.15, table.width + 0.1, 0.5, bottom)
@@ -126,11 +126,10 @@ def latency_axis(results: Results) -> LatencyAxis:
     return LatencyAxis.of(np.array(late or [row.watched_ms or 0.0 for row in rows if row.outcome == "missed"]))
 
 
-def _axis_of(marks: Sequence[_Marks], results: Results) -> _Axis:
-    missed = np.concatenate([item.missed for item in marks])
+def _axis_of(results: Results) -> _Axis:
     scale = latency_axis(results)
     low, end = scale.low, scale.high
-    if not np.any(missed > end):
+    if not any(row.outcome == "missed" and (row.watched_ms or 0.0) > end for row in results.scored_contacts):
         return _Axis(scale, end)
     return _Axis(scale, end * (end / low) ** _BEYOND if scale.logarithmic else end + _BEYOND * (end - low))
 

@@ -88,12 +88,6 @@ def trace_words(trace: Trace) -> list[str]:
     return words
 
 
-def force_steps(results: Results, group: str) -> list[tuple[float, float]]:
-    """Return from when [s after the onset] which force [N] is allowed in a group; empty without force limits."""
-    profile = results.provenance.get("force_profiles", {}).get(group, {})
-    return [(step["from_s"], step["at_most_n"]) for step in profile.get("steps", ())]
-
-
 def _seen(trace: Trace, row: Panel) -> ContactOutcome | None:
     return row.seen[trace.contact] if trace.contact >= 0 else None
 
