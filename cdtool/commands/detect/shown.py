@@ -13,7 +13,6 @@ from cdtool.base.plain_text import LISTED, NAMED, counted
 from cdtool.commands.console.colour import Toned
 from cdtool.commands.console.console import number, plain, print_line, say, table
 from cdtool.commands.console.contact_rows import contact_as_json
-from cdtool.commands.console.truth_shown import NEGATIVE
 
 if TYPE_CHECKING:
     from cdtool.alarms.pipeline import Detection
@@ -23,6 +22,8 @@ if TYPE_CHECKING:
     from cdtool.results.results import ContactResult
     from cdtool.truth.matching import Matching
 
+# Shown next to a negative latency.
+_NEGATIVE = "alarm before the onset, within its uncertainty: counted as 0"
 # `found_by` of a contact whose onset was found by the rule for the load cell.
 _CELL = "load cell"
 # The colours of outcomes.
@@ -92,7 +93,7 @@ def _rows_of(found: Detected, detection: Detection, matching: Matching) -> list[
         figures = (number(alarm.statistic, 4), number(alarm.limit, 4), late)
         why = "" if alarm in latency else _why_no_latency(found, alarm)
         if alarm in latency and latency[alarm].clipped:
-            why = NEGATIVE
+            why = _NEGATIVE
         if alarm in latency and latency[alarm].contact.hole:
             later = 1e3 * latency[alarm].contact.uncertainty
             missing = f"up to {later:.0f} ms later: load-cell samples missing at the onset"

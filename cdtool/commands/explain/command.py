@@ -15,11 +15,11 @@ from cdtool.base.plain_text import LISTED, counted
 from cdtool.commands.console.console import (
     leave,
     number,
-    plain,
     print_json,
     print_line,
     print_not_assessable,
     print_skipped,
+    print_written,
     say,
     table,
 )
@@ -91,9 +91,8 @@ def explain(
     else:
         for _, run in runs:
             _show_explained(run)
-    for path in _draw(explained.runs, drawn, log_stem(log), force=force):
-        if not as_json:
-            print_line(f"plot written to {plain(path)}")
+    plots = _draw(explained.runs, drawn, log_stem(log), force=force)
+    print_written(() if as_json else plots)
     leave(skipped, findings, print_not_assessable([(name, run.found) for name, run in runs]))
 
 
