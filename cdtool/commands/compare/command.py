@@ -149,7 +149,7 @@ def _show_table(found: BuildComparison) -> None:
     used = detector_table(columns, cells, {name: brief for brief, name in DETECTORS.short_names.items()})
     if used:
         say("; ".join(f"{brief}: {name}" for brief, name in DETECTORS.short_names.items() if name in used))
-    say("old / new; latency: mean, or median below ten contacts; contacts: one number if both files have as many")
+    say("old / new, or one number for both; latency: mean, or median below ten contacts")
     typer.echo()
 
 

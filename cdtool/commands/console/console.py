@@ -14,8 +14,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from itertools import zip_longest
 from pathlib import Path, PurePath
-from textwrap import fill, wrap
-from time import perf_counter
+from textwrap import TextWrapper, wrap
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -66,8 +65,7 @@ def print_line(text: str, *, err: bool = False) -> None:
     """Print a line to stdout or stderr; a terminal gets it wrapped at words, without splitting names."""
     stream = sys.stderr if err else sys.stdout
     if stream.isatty():
-        indent = text[: len(text) - len(text.lstrip())]
-        text = _wrapped(text.lstrip(), max(shutil.get_terminal_size().columns, _NARROWEST), indent)
+        text = _wrapped(text, max(shutil.get_terminal_size().columns, _NARROWEST))
     word, colon, rest = text.partition(":")
     typer.echo(coloured(word, _TONES.get(word, ""), stream) + colon + rest, err=err, color=True)
 
@@ -78,8 +76,9 @@ def print_next(*words: object, first: str = "next") -> None:
     lines = [" ".join("*".join(part and shlex.quote(part) for part in plain(word).split("*")) for word in words)]
     if sys.stdout.isatty() and os.name != "nt":  # the shells of Windows continue lines in other ways
         width = columns_to_fill() - len(first) - len(":  \\")
-        lines = wrap(lines[0], width, break_long_words=False, break_on_hyphens=False)
-    typer.echo(f"{first}: " + f" \\\n{' ' * (len(first) + 2)}".join(lines))
+        together = re.sub(r" (-\S+) ", " \\1\xa0", lines[0])  # an option and its value
+        lines = wrap(together, width, break_long_words=False, break_on_hyphens=False)
+    typer.echo(f"{first}: " + f" \\\n{' ' * (len(first) + 2)}".join(lines).replace("\xa0", " "))
 
 
 def print_written(targets: Iterable[Path], first: str = "report.html") -> None:
@@ -92,11 +91,10 @@ def print_written(targets: Iterable[Path], first: str = "report.html") -> None:
             print_line(f"written: {plain(target)}")
 
 
-def _wrapped(text: str, width: int, indent: str = "") -> str:
-    more = f"{indent}  "
-    return fill(
-        text, width, initial_indent=indent, subsequent_indent=more, break_long_words=False, break_on_hyphens=False
-    )
+def _wrapped(text: str, width: int) -> str:
+    indent = " " * (len(text) - len(text.lstrip()))
+    wrapper = TextWrapper(width, indent, f"{indent}  ", break_long_words=False, break_on_hyphens=False)
+    return wrapper.fill(text.lstrip())
 
 
 def print_json(value: Any) -> None:
@@ -180,7 +178,7 @@ def print_not_assessable(logs: Iterable[tuple[str, Detected]]) -> list[Fact]:
 
 def say(text: str, indent: str = "", tone: str = "") -> None:
     """Print a sentence to stdout in lines that fit the terminal; names are not split. `tone`: its colour."""
-    typer.echo(coloured(_wrapped(plain(text), columns_to_fill(), indent), tone), color=True)
+    typer.echo(coloured(_wrapped(indent + plain(text), columns_to_fill()), tone), color=True)
 
 
 def columns_to_fill() -> int:
@@ -296,13 +294,10 @@ def progress(what: str, *, pulses: bool = False, quiet: bool = False) -> Iterato
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Bar(*columns, console=Console(stderr=True), transient=True, auto_refresh=pulses) as bar:
         task = bar.add_task(what, total=None)
-        drawn = -math.inf
+        pace = Pace(0.1)  # s: more is not seen
 
         def advance(done: int, total: int) -> None:
-            nonlocal drawn
-            now = perf_counter()
-            is_due = not pulses and (now - drawn > 0.1 or done == total)  # s: more is not seen
-            drawn = now if is_due else drawn
+            is_due = not pulses and (done == total or pace.is_due())
             bar.update(task, completed=done, total=total, refresh=is_due)
 
         bar.refresh()

@@ -45,18 +45,15 @@ def show_detected(done: Sequence[Detected], forces: Mapping[str, ForceSummary]) 
 
 def show_conclusion(done: Sequence[Detected]) -> None:
     """Print in one line how many operations have which verdict, and how many contacts which outcome."""
-    detections = [detection for found in done for detection in found.detections]
-    matches = [item for found in done for matching in found.matchings for item in matching.matches]
+    verdicts = [detection.verdict.outcome for found in done for detection in found.detections]
+    contacts = [item.outcome for found in done for matching in found.matchings for item in matching.matches]
     parts = [
         ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in sorted(Counter(names).items()))
-        for names in (
-            [detection.verdict.outcome for detection in detections],
-            [item.outcome for item in matches],
-        )
+        for names in (verdicts, contacts)
     ]
-    words = f"{counted(len(detections), 'operation')}: {parts[0]}" if detections else "no operation"
-    words += f"; {counted(len(matches), 'contact')}: {parts[1]}" if matches else "; no contact"
-    say(words, tone="bad" if any(item.outcome == "missed" for item in matches) else "")
+    words = f"{counted(len(verdicts), 'operation')}: {parts[0]}" if verdicts else "no operation"
+    words += f"; {counted(len(contacts), 'contact')}: {parts[1]}" if contacts else "; no contact"
+    say(words, tone=next((tone for outcome, tone in _TONES.items() if outcome in (*contacts, *verdicts)), ""))
 
 
 def as_rows(done: Sequence[tuple[Path, Detected]], forces: Mapping[str, ForceSummary]) -> list[dict[str, Any]]:

@@ -20,6 +20,7 @@ from cdtool.commands.console.console import (
     print_not_assessable,
     print_skipped,
     print_written,
+    progress,
     say,
     table,
 )
@@ -70,14 +71,15 @@ def explain(
     from cdtool.commands.judging.settings_table import given_settings
 
     drawn = plot if plot is None or plot.is_dir() else figure_name(plot, force=force)
-    ready = prepared(
-        machine,
-        benchmark=benchmark,
-        signature=signature,
-        detector=detectors and one_detector(detectors),
-        settings=given_settings(settings or ()),
-    )
-    explained = explain_log(log, ready)
+    with progress("explaining", pulses=True):
+        ready = prepared(
+            machine,
+            benchmark=benchmark,
+            signature=signature,
+            detector=detectors and one_detector(detectors),
+            settings=given_settings(settings or ()),
+        )
+        explained = explain_log(log, ready)
     runs = [(run.found.recording.source if ready.has_runs else str(log), run) for run in explained.runs]
     skipped = [*ready.skipped, *explained.skipped]
     skipped += [item for run in explained.runs for item in run.found.not_scored]

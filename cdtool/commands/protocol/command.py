@@ -11,7 +11,7 @@ import typer
 from cdtool.base.errors import UsageError
 from cdtool.base.exit_status import Fact, statuses_words
 from cdtool.base.plain_text import LISTED, counted
-from cdtool.commands.console.console import leave, plain, print_json, print_line, print_next, say
+from cdtool.commands.console.console import leave, plain, print_json, print_line, print_next, progress, say
 from cdtool.commands.console.options import ForceOption, JsonOption
 from cdtool.commands.console.place import Place, location
 
@@ -120,8 +120,9 @@ def write(
         raise UsageError("--output is missing", "add -o protocol.pdf or -o protocol.html")
     check_outputs(output, force=force, subject="protocol")
     names = [word for path in output for word in ("-o", path.name)]
-    made = make(file, command=shlex.join(["cdtool", "protocol", "write", str(file), *names]))
-    write_outputs(ProtocolReport(made), output, force=force, inputs=(file,), subject="protocol")
+    with progress("writing the protocol", pulses=True):
+        made = make(file, command=shlex.join(["cdtool", "protocol", "write", str(file), *names]))
+        write_outputs(ProtocolReport(made), output, force=force, inputs=(file,), subject="protocol")
     show_protocol(made, output)
     leave(facts=_FACTS[made.verdict.outcome])
 
