@@ -88,9 +88,8 @@ _NOTES = {
         "none."
     ),
     "force": (
-        "Load cell as it was read, over the time since the onset; verdicts use the force corrected for its reading at "
-        "rest and for the mass before the cell. Coloured: the contact with the highest peak, and the detectors' "
-        "alarms on it."
+        "Load cell minus its reading at rest, over the time since the onset; verdicts are corrected for the mass "
+        "before the cell too. Coloured: the worst contact, and the detectors' alarms on it."
     ),
     "calibration": (
         "Each factor was set on impact-free operations, each assessed with a threshold that was not learned from it."

@@ -154,5 +154,5 @@ def tone_of(outcome: str) -> str:
 
 
 def shown(name: object) -> str:
-    """Return a name from a file as a text that is never empty."""
-    return str(name) or "(no name)"
+    """Return a name from a file as a text that is never empty; the group `holdout` as texts call it."""
+    return {"": "(no name)", "holdout": "hold-out"}.get(str(name), str(name))

@@ -20,6 +20,7 @@ from cdtool.base.plain_text import plain
 from cdtool.report.html.page import to_html
 from cdtool.report.html.traces import ABOVE_ALL, ALPHABET, BELOW_ALL, MISSING, packed
 from cdtool.report.number_text import number, percent, with_interval
+from cdtool.report.table import shown
 from cdtool.report.writers.base import Report
 from cdtool.results.evaluated import Evaluated
 from cdtool.statistics.interval import Interval
@@ -177,7 +178,7 @@ def test_every_value_of_the_summaries_is_in_the_table(made, page):
     rows = page.tables["all-results-table"][1:]
     assert len(rows) == len(evaluated.summaries)
     for row, item in zip(rows, evaluated.summaries, strict=True):
-        assert row[0].startswith(item.detector) and row[1] == item.group
+        assert row[0].startswith(item.detector) and row[1] == shown(item.group)
         std = Interval(item.std_ms, math.nan, math.nan)
         for cell, figure in zip(row[2:6], (item.mean, std, item.median, item.p95), strict=True):
             assert cell == with_interval(figure, item.resolution_ms).removesuffix(" (–)")
