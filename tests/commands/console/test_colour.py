@@ -67,7 +67,7 @@ def test_missed_contacts_and_false_alarms_are_red_and_not_assessable_ones_yellow
     assert f"{RED}\x1b[1m1 of 11\x1b" in stiff and "\x1b[33m\x1b[22m1 of 12\x1b" in stiff
     quick = next(line for line in lines if line.startswith("stiff") and "quick" in line)
     assert "\x1b" not in quick, "zeros have no colour"
-    free = next(line for line in lines if line.startswith("holdout") and "slow" in line)
+    free = next(line for line in lines if line.startswith("hold-out") and "slow" in line)
     assert f"{RED}\x1b[1m1 in " in free
 
 
