@@ -92,7 +92,7 @@ def test_a_table_contains_the_results_of_each_group(evaluated):
 def test_a_detector_that_assessed_nothing_has_no_rate_and_no_bound(results):
     blind = replace(results, exposure=(ExposureResult("holdout", "momentum", 40, 40, 0.0, 40),), false_alarms=())
     text = to_markdown(Report(evaluate(blind)))
-    shown, every = [row for row in rows(text) if "holdout" in row[:2] and "momentum" in row[:2]][:2]
+    shown, every = [row for row in rows(text) if "hold-out" in row[:2] and "momentum" in row[:2]][:2]
     assert shown[4] == "**not assessable in any of 40 operations**"
     assert every[-4:-1] == ["not assessable in any of 40 operations", "–", "–"]
     assert "0 in 40" not in text
