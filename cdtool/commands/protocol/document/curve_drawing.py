@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 _IN_ROW = 4
 # Sizes [inch]: of a drawing, its margins, and the distance of two panels. Given, not found by trial, which takes a
 # second.
-_WIDTH, _HEIGHT, _LEFT, _TOP, _BELOW, _APART = 6.9, 1.85, 0.5, 0.27, 0.34, 0.16
-_FONT = 7.0
+_WIDTH, _HEIGHT, _LEFT, _TOP, _BELOW, _APART = 6.9, 1.75, 0.5, 0.27, 0.34, 0.16
+_FONT = 7.0  # legible on paper [points]
 # The axis of the time ends at a multiple of this [s].
 _ROUNDED = 0.1
 _EXCEEDED, _EXPANDED = "#b3261e", "0.93"
@@ -37,14 +37,14 @@ _EXCEEDED, _EXPANDED = "#b3261e", "0.93"
 _LOW = 0.35
 
 
-class _Scale(NamedTuple):
+class _PartedAxis(NamedTuple):
     """An axis that is linear between its nodes; `places` are those of the nodes along the axis, from 0 to 1."""
 
     nodes: FloatArray
     places: FloatArray
 
     @classmethod
-    def of(cls, nodes: Sequence[float], weights: Sequence[float]) -> _Scale:
+    def of(cls, nodes: Sequence[float], weights: Sequence[float]) -> _PartedAxis:
         """Return a scale whose parts are as long as their weights."""
         return cls(np.asarray(nodes), np.cumsum([0.0, *weights]) / sum(weights))
 
@@ -89,23 +89,23 @@ def curve_drawings(point: PointAssessment, words: Words, quantity: str = "curve"
                 alt.append(f"{title}: {', '.join(map(' '.join, compared))}")
             figure.axes[0].set_ylabel(words(f"{quantity}.axis"), fontsize=_FONT)
             key = "curve.time" if len(scales[0].nodes) == 2 else "curve.compressed"
-            figure.text(0.5, 0.01, words(key, begin=float(scales[0].nodes[1])), ha="center", fontsize=_FONT)
+            figure.text(0.5, 0.0, words(key, begin=float(scales[0].nodes[1])), ha="center", va="bottom", fontsize=_FONT)
         text = words(f"{quantity}.alt", point=plain(point.point.name), values="; ".join(alt))
         yield CurveDrawing(svg_text(figure), text)
 
 
-def _time_scale(profile: ForceProfile, repetitions: Sequence[Repetition]) -> _Scale:
+def _time_scale(profile: ForceProfile, repetitions: Sequence[Repetition]) -> _PartedAxis:
     """Return the axis of the time over all steps, at least as long as the record must be."""
     begins = [step.from_s for step in profile.steps]
     longest = max(item.curve.end for item in repetitions)
     end = max(longest, required_record(profile), begins[-1] + LAST_STEP_S)
     # The first of several steps has the peak.
-    return _Scale.of(
+    return _PartedAxis.of(
         [*begins, _ROUNDED * math.ceil(end / _ROUNDED)], [1.4 if len(begins) > 2 else 1.0, *(1.0 for _ in begins[1:])]
     )
 
 
-def _force_scale(profile: ForceProfile, repetitions: Sequence[Repetition]) -> _Scale:
+def _force_scale(profile: ForceProfile, repetitions: Sequence[Repetition]) -> _PartedAxis:
     """Return the axis up to the highest force and limit; a limit near the bottom has a part of it to itself."""
     limits = sorted(step.at_most_n for step in profile.steps)
     nodes = [1.12 * max(limits[-1], *(item.curve.peak for item in repetitions))]
@@ -113,15 +113,17 @@ def _force_scale(profile: ForceProfile, repetitions: Sequence[Repetition]) -> _S
         if 2.0 * limit < _LOW * nodes[0]:
             nodes.insert(0, 2.0 * limit)
     lowest = min(0.0, *(1.1 * float(item.curve.force.min()) for item in repetitions))
-    return _Scale.of([lowest, *nodes], [*(1.0 for _ in nodes[1:]), 2.0])
+    return _PartedAxis.of([lowest, *nodes], [*(1.0 for _ in nodes[1:]), 2.0])
 
 
-def _draw(axes: Axes, item: Repetition, scales: tuple[_Scale, _Scale], words: Words) -> None:
+def _draw(axes: Axes, item: Repetition, scales: tuple[_PartedAxis, _PartedAxis], words: Words) -> None:
     """Draw a curve with the limits, the times from which they apply, and the largest value of each step."""
     time, force = scales
     steps, end = [step.step for step in item.verdict.steps], float(time.nodes[-1])
     limits = [step.at_most_n for step in steps]
-    time.set(axes, "x", time.nodes.tolist(), words)
+    time.set(
+        axes, "x", time.nodes.tolist() if len(steps) > 1 else np.arange(0.0, end, math.ceil(end / 6.0)).tolist(), words
+    )
     force.set(axes, "y", [0.0, *limits], words)
     if len(force.nodes) > 2:
         axes.axhspan(force.nodes[0], force.nodes[-2], color=_EXPANDED, linewidth=0)
@@ -129,7 +131,7 @@ def _draw(axes: Axes, item: Repetition, scales: tuple[_Scale, _Scale], words: Wo
         axes.axhline(node, color="white", linewidth=1.5)
     for begin in time.nodes[1:-1]:
         axes.axvline(begin, color="0.6", linewidth=0.7)
-    if item.curve.end < end - _ROUNDED:
+    if item.curve.end < end - 2.0 * _ROUNDED:
         axes.axvspan(item.curve.end, end, fill=False, edgecolor="0.6", hatch="////", linewidth=0)
     kept = kept_samples(axes.xaxis.get_transform().transform(item.curve.time), item.curve.force, 900)
     axes.plot(item.curve.time[kept], item.curve.force[kept], color=FORCE, linewidth=0.9)

@@ -224,9 +224,10 @@ def _results(protocol: Protocol, words: Words) -> Iterator[Block]:
             yield from curve_drawings(point, words)
             if pressures := pressure_curves(point):
                 yield from curve_drawings(pressures, words, "pressure_curve")
-    yield SectionHeading(words("section.explanations"), keep=True)
-    yield Paragraph(words("text.results"), "note")
-    yield Paragraph(words("text.curves"), "note")
+    if any(point.repetitions for point in protocol.points):
+        yield SectionHeading(words("section.explanations"), keep=True)
+        yield Paragraph(words("text.results"), "note")
+        yield Paragraph(words("text.curves"), "note")
 
 
 def _forces(point: PointAssessment, profile: ForceProfile, verdict: PointVerdict, words: Words) -> HeadedTable:

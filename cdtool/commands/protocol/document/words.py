@@ -60,11 +60,10 @@ class Words:
         """Return the symbol of the largest force in a step, or else the name of the step."""
         return self.name("symbol", step) if step in self.texts["symbol"] else self.name("step", step)
 
-    def names(self, names: Sequence[str], between: str = ", ") -> str:
+    def names(self, names: Sequence[str]) -> str:
         """Return names in a list, or the first ones that fit into a few lines and how many more there are."""
-        lengths = accumulate(len(name) + len(between) for name in names)
-        count = max(1, sum(length <= _NAMED for length in lengths))
-        listed = between.join(names[:count])
+        count = max(1, sum(length <= _NAMED for length in accumulate(len(name) + 2 for name in names)))
+        listed = ", ".join(names[:count])
         return listed if count >= len(names) else self("verdict.more_names", names=listed, count=len(names) - count)
 
     def value(self, value: object) -> str:
@@ -137,7 +136,7 @@ class Words:
                 places.append(self(key, point=point, numbers=numbers, recording=recordings[0]))
             else:
                 places.append(", ".join([point, *recordings]))
-        return self.names(places, "; ")
+        return "; ".join(places)
 
     def _measured(self, value: object, limit: object) -> str:
         """Return a measured value, or the range of several, beside its limit; other values as they are."""
