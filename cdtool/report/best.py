@@ -1,8 +1,8 @@
 """Each group of a benchmark in a sentence: the best detector, its latency, and what its zeros can mean at most.
 
 Conventions: best is who has the fewest contacts missed or not assessable, then the fewest false alarms in all groups,
-then the least median as it is shown; equal ones are named together. Whether that difference is more than chance is known
-from the comparisons of pairs.
+then the least median as it is shown; equal ones are named together. Whether that difference is more than chance is
+known from the comparisons of pairs.
 """
 
 from __future__ import annotations

@@ -14,6 +14,7 @@ from cdtool.base.plain_text import LISTED, counted
 from cdtool.commands.console.colour import Toned
 from cdtool.commands.console.console import detector_table, leave, print_line, say
 from cdtool.report.number_text import NOTHING, number, percent
+from cdtool.report.table import shown
 
 if TYPE_CHECKING:
     from cdtool.report.few_contacts import LatencyColumn
@@ -77,12 +78,12 @@ def _show_summaries(items: Sequence[Summary], heading: str, short: Mapping[str, 
     """Print one row per detector and group or kind of contact; false alarms belong to no kind."""
     from cdtool.report.few_contacts import latency_columns
 
-    shown = latency_columns(items)
+    latencies = latency_columns(items)
     bounded = any(item.few and not math.isnan(item.median.low) for item in items)
     headings = _HEADINGS | ({"median": "median ms\n(95 %)"} if bounded else {})
     columns = [(heading, "left"), ("detector", "left")]
-    columns += [(name, "right") for name in (*(headings[name] for name in shown), *_COUNTED)]
-    return detector_table(columns, [_row(item, shown) for item in items], short)
+    columns += [(name, "right") for name in (*(headings[name] for name in latencies), *_COUNTED)]
+    return detector_table(columns, [_row(item, latencies) for item in items], short)
 
 
 def _show_conditions(evaluated: Evaluated, short: Mapping[str, str]) -> set[str]:
@@ -151,13 +152,13 @@ def finish(evaluated: Evaluated) -> None:
     leave(results.skipped, results.findings, [Fact[name.upper()] for name in results.conclusion.facts])
 
 
-def _row(item: Summary, shown: Sequence[LatencyColumn]) -> tuple[Any, ...]:
+def _row(item: Summary, columns: Sequence[LatencyColumn]) -> tuple[Any, ...]:
     if not item.contacts:
-        return item.group, item.detector, *(("-",) * (len(shown) + 1)), "", _false_alarms(item)
+        return shown(item.group), item.detector, *(("-",) * (len(columns) + 1)), "", _false_alarms(item)
     return (
-        item.group,
+        shown(item.group),
         item.detector,
-        *(_latency(item, column) for column in shown),
+        *(_latency(item, column) for column in columns),
         _counted(item.missed, f"of {item.assessable}", "bad") if item.assessable else "-",
         _counted(item.not_assessable, f"of {item.contacts}", "unknown") if item.not_assessable else "",
         _false_alarms(item),
@@ -202,7 +203,7 @@ def _show_statistics(summaries: Sequence[Summary]) -> None:
         if not item.contacts and item.watched and not item.false_alarms:
             alarms[item.judged_operations].append(item.at_most_per_operation)
     parts = [f"0 of {of} missed: up to {percent(max(missed[of]))}" for of in _ends(missed)]
-    parts += [f"0 false alarms in {of}: up to {number(max(alarms[of]), 2)} per operation" for of in _ends(alarms)]
+    parts += [f"0 false alarms in {of}: up to {number(max(alarms[of]))} per operation" for of in _ends(alarms)]
     if parts:
         say(f"{'; '.join(parts)} (95 %)")
     say(explained(summaries).split(". ")[0])

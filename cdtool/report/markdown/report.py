@@ -7,7 +7,7 @@ from urllib.parse import quote
 from cdtool.base.errors import UsageError
 from cdtool.report.markdown.text import Section, escape, fitted
 from cdtool.report.model import TITLES, Model
-from cdtool.report.table import Table
+from cdtool.report.table import Table, shown
 from cdtool.report.writers.base import Image, Report
 
 # Room for the verdict and how to read the results, whatever the names.
@@ -42,7 +42,7 @@ def to_markdown(report: Report, most: int = 60_000) -> str:
     results += [Section("", _image(image)) for image in report.images if image.group is None]
     for group in dict.fromkeys(image.group for image in report.images if image.group is not None):
         own = [_image(image) for image in report.images if image.group == group]
-        results.append(Section(escape(group), tail="\n\n".join(own)))
+        results.append(Section(escape(shown(group)), tail="\n\n".join(own)))
     if model.notes["pairs"]:
         results.append(Section(TITLES["comparisons"], escape(model.notes["pairs"], None)))
     if "force" in model.tables:
