@@ -113,6 +113,5 @@ def test_measurements_that_are_counted_twice_are_listed_in_one_sentence():
     about = {"other": "1.csv", "contact": 1, "other_contact": 1}
     places = [("edge", "2.csv"), ("edge", "3.csv"), ("side", "4.csv")]
     same = [Reason("same_measurement", {"point": point, "recording": log, **about}) for point, log in places]
-    verdict = ProtocolVerdict(tuple(same))
-    (sentence,) = words_of("en").reasons(verdict, "incomplete")
+    (sentence,) = words_of("en").reasons(ProtocolVerdict(tuple(same)), "incomplete")
     assert sentence.startswith("edge, 2.csv = 1.csv, 3.csv = 1.csv; side, 4.csv = 1.csv: the same measurement")
