@@ -166,7 +166,7 @@ def plot_restitution(curves: Sequence[RestitutionCurve]) -> Figure:
             axes.plot(curve.variable, curve.hunt_crossley, color=colour, linewidth=0.9, linestyle=(0, (4, 2)))
             _name(axes, (curve.variable[-1], curve.exact[-1]), curve.name, colour, (4, 0), va="center")
         axes.plot([], [], color="0.3", linewidth=1.6, label="Hunt-Crossley, exact")
-        axes.plot([], [], color="0.3", linewidth=0.9, linestyle=(0, (4, 2)), label="e = 1 - α v (3.21)")
+        axes.plot([], [], color="0.3", linewidth=0.9, linestyle=(0, (4, 2)), label="e = 1 − α v (3.21)")
         axes.legend(loc="upper right")
         axes.set_xlabel("approach speed v [m/s]")
         _restitution_axis(axes, float(curves[0].variable[-1]))

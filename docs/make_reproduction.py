@@ -23,6 +23,7 @@ from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.signature_store import write_signature
 from cdtool.recordings.recording import Recording
 from cdtool.report.plots.figures import drawing, new_figure, save
+from cdtool.report.plots.panels import cover_peak
 from cdtool.report.plots.trigger_plot import most_informative, trigger_figure
 from cdtool.results.summary import Summary
 from cdtool.results.traces.decimation import decimate
@@ -147,6 +148,8 @@ def impacts(work: Path) -> None:
                 panels[row, column].plot(1e3 * time, values, color="black", linewidth=0.9)
                 if column == 0:
                     panels[row, column].set_ylabel(text)
+                if row == 0:
+                    cover_peak(panels[row, column], float(values.max()))
             panels[0, column].set_title(f"{kind} impact", loc="left")
             panels[1, column].set_xlabel("time from contact onset [ms]")
         save(figure, IMAGES / "reproduction_5_3.png")

@@ -11,20 +11,8 @@ from cdtool.base.errors import ConfigurationError, nearest
 # eyes, without red cones and without green ones; all have a contrast of at least 3 : 1 on white (WCAG 2.2, 1.4.11).
 BLUE, TEAL, PLUM, OCHRE, RUST = "#0070CE", "#679A95", "#781D4E", "#C38700", "#873C01"
 NAVY, OLIVE, GREY, UMBER, STEEL, BROWN = "#332288", "#7A7A00", "#595959", "#6B4E16", "#2E86B8", "#8C613C"
-# The same colours on a dark page, where the same holds.
-DARK = {
-    BLUE: "#6BB5FB",
-    TEAL: "#C9E6DD",
-    PLUM: "#89657E",
-    OCHRE: "#FFDD4C",
-    RUST: "#B18565",
-    NAVY: "#8F84E8",
-    OLIVE: "#B8B84A",
-    GREY: "#B0B0B0",
-    UMBER: "#B09050",
-    STEEL: "#7CC4E8",
-    BROWN: "#C99A70",
-}
+# The first five on a dark page, where the same holds; it mixes the others with white.
+DARK = {BLUE: "#6BB5FB", TEAL: "#C9E6DD", PLUM: "#89657E", OCHRE: "#FFDD4C", RUST: "#B18565"}
 
 # Markers that both the figures and the HTML page can draw, named as in matplotlib, each with the dashes and gaps of its
 # curves in widths of the line.

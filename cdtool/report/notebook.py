@@ -42,8 +42,11 @@ def notebook_table(verdict: str, frame: pd.DataFrame, tone: str = "", more: str 
 
 
 def as_frame(table: Table) -> pd.DataFrame:
-    """Return a table of the report as a DataFrame of its texts."""
+    """Return a table of the report as a DataFrame of its texts; the heading of a part is a row of its own."""
     import pandas as pd
 
     names = [column.heading for column in table.columns]
-    return pd.DataFrame([[cell.line for cell in row] for row in table.rows], columns=names)
+    rows = [[cell.line for cell in row] for row in table.rows]
+    for place, part in [*table.parts.items()][::-1]:
+        rows.insert(place, [part.line, *[""] * (len(names) - 1)])
+    return pd.DataFrame(rows, columns=names)

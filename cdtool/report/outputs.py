@@ -43,6 +43,21 @@ def check_outputs(targets: Sequence[Path], *, force: bool = False, subject: Subj
                 refuse_other_kind(path, writer.kinds[path.suffix.lower()], force=force)
 
 
+def check_output_names(targets: Sequence[Path], suffixes: Sequence[str]) -> None:
+    """Raise UsageError for a name with another suffix, a name given twice, or one in a folder that does not exist."""
+    for target in targets:
+        if target.suffix.lower() not in suffixes:
+            *others, last = suffixes
+            raise UsageError(f"--output is '{plain(target)}'", f"the name must end in {', '.join(others)} or {last}")
+        if targets.count(target) > 1:
+            raise UsageError(f"--output is '{plain(target)}' twice", "give each name once")
+        resolved(target)
+        if not is_remote(target) and not target.parent.is_dir():
+            raise UsageError(
+                f"--output is '{plain(target)}': no folder {plain(target.parent)}", "create the folder first"
+            )
+
+
 def write_outputs(
     report: Any,
     targets: Sequence[Path],

@@ -18,7 +18,7 @@ from cdtool.commands.detecting.detection import Detected
 from cdtool.detectors.detection import Alarm
 from cdtool.recordings.recording import Contact
 from cdtool.report.number_text import number
-from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label, write
+from cdtool.report.plots.figures import drawing, label, log_label, new_figure, save, unit_label, write
 from cdtool.report.plots.panels import (
     Legend,
     count_from,
@@ -103,7 +103,7 @@ def _figure(found: Detected) -> Figure:
         late = next(row for rows in found.contact_rows for row in rows if row.outcome == "detected")
         _write_latency(grid[len(joints), -1], event, number(late.latency_ms, error=late.resolution_ms))
     figure.suptitle(
-        f"{label(recording.name, 60)}  ·  {label(detector)}\n{_outcome_words(found, alarming, joints)}",
+        f"{log_label(recording.name)}  ·  {label(detector)}\n{_outcome_words(found, alarming, joints)}",
         fontsize=10,
         x=0.01,
         ha="left",

@@ -13,7 +13,6 @@ from cdtool.base.plain_text import LISTED, NAMED, counted
 from cdtool.commands.console.colour import Toned
 from cdtool.commands.console.console import number, plain, print_line, say, table
 from cdtool.commands.console.contact_rows import contact_as_json
-from cdtool.commands.console.truth_shown import NEGATIVE
 
 if TYPE_CHECKING:
     from cdtool.alarms.pipeline import Detection
@@ -23,6 +22,8 @@ if TYPE_CHECKING:
     from cdtool.results.results import ContactResult
     from cdtool.truth.matching import Matching
 
+# Shown next to a negative latency.
+_NEGATIVE = "alarm before the onset, within its uncertainty: counted as 0"
 # `found_by` of a contact whose onset was found by the rule for the load cell.
 _CELL = "load cell"
 # The colours of outcomes.
@@ -48,18 +49,15 @@ def show_detected(done: Sequence[Detected], forces: Mapping[str, ForceSummary]) 
 
 def show_conclusion(done: Sequence[Detected]) -> None:
     """Print in one line how many operations have which verdict, and how many contacts which outcome."""
-    detections = [detection for found in done for detection in found.detections]
-    matches = [item for found in done for matching in found.matchings for item in matching.matches]
+    verdicts = [detection.verdict.outcome for found in done for detection in found.detections]
+    contacts = [item.outcome for found in done for matching in found.matchings for item in matching.matches]
     parts = [
         ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in sorted(Counter(names).items()))
-        for names in (
-            [detection.verdict.outcome for detection in detections],
-            [item.outcome for item in matches],
-        )
+        for names in (verdicts, contacts)
     ]
-    words = f"{counted(len(detections), 'operation')}: {parts[0]}" if detections else "no operation"
-    words += f"; {counted(len(matches), 'contact')}: {parts[1]}" if matches else "; no contact"
-    say(words, tone="bad" if any(item.outcome == "missed" for item in matches) else "")
+    words = f"{counted(len(verdicts), 'operation')}: {parts[0]}" if verdicts else "no operation"
+    words += f"; {counted(len(contacts), 'contact')}: {parts[1]}" if contacts else "; no contact"
+    say(words, tone=next((tone for outcome, tone in _TONES.items() if outcome in (*contacts, *verdicts)), ""))
 
 
 def as_rows(done: Sequence[tuple[Path, Detected]], forces: Mapping[str, ForceSummary]) -> list[dict[str, Any]]:
@@ -102,7 +100,7 @@ def _rows_of(
         figures = (number(alarm.statistic, 4), number(alarm.limit, 4), late)
         why = "" if alarm in latency else _why_no_latency(found, alarm)
         if alarm in latency and latency[alarm].clipped:
-            why = NEGATIVE
+            why = _NEGATIVE
         if alarm in latency and latency[alarm].contact.hole:
             later = 1e3 * latency[alarm].contact.uncertainty
             missing = f"up to {later:.0f} ms later: load-cell samples missing at the onset"

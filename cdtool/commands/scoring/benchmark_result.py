@@ -222,9 +222,9 @@ class BenchmarkResult:
         """Return the verdict and the table of results of the reports, which a notebook shows."""
         from cdtool.report.model import counts_text
         from cdtool.report.notebook import as_frame, notebook_table
-        from cdtool.report.tables.results import short_results_table
+        from cdtool.report.tables.results import results_table
 
-        rows = as_frame(short_results_table(self.evaluated.summaries))
+        rows = as_frame(results_table(self.evaluated.summaries))
         return notebook_table(self.headline, rows, self.results.conclusion.tone, counts_text(self.evaluated))
 
 

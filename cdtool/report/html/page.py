@@ -13,7 +13,7 @@ from cdtool.report.html.page_tables import PageTable, classes
 from cdtool.report.html.plots import plot_data, traces_of
 from cdtool.report.html.self_contained import content_policy, page_part, page_template, script_json, style_sheet
 from cdtool.report.html.traces import plot_height, trace_data
-from cdtool.report.model import NO_CERTIFICATE, TITLES, TITLES_OF_MANY
+from cdtool.report.model import TITLES, TITLES_OF_MANY
 from cdtool.report.plots.trace_words import LatencyTexts
 from cdtool.report.table import Log
 from cdtool.report.tables.attention import failed_traces
@@ -21,21 +21,9 @@ from cdtool.report.writers.base import Report
 
 # The model's tables that the page shows; single contacts are in its recordings and their traces.
 _TABLES = (
-    *(
-        "attention",
-        "not_met",
-        "met",
-        "results",
-        "kinds",
-        "conditions",
-        "injected",
-        "comparisons",
-        "force",
-        "points",
-        "forces",
-    ),
-    *("recordings", "cases"),
-    *("not_assessable", "skipped", "damaged", "findings", "calibration"),
+    *("attention", "not_met", "met", "results", "all_results", "kinds", "conditions", "injected", "comparisons"),
+    *("force", "points", "forces", "recordings", "cases", "not_assessable"),
+    *("skipped", "damaged", "findings", "calibration"),
 )
 _TEMPLATE = "report.html.j2"
 # In the order in which they use one another.
@@ -67,11 +55,11 @@ def to_html(report: Report) -> str:
         printed=_printed(model.failed, of_logs),
         model=model,
         titles=TITLES | (TITLES_OF_MANY if "cases" in model.tables else {}),
-        certificate=NO_CERTIFICATE,
         tables=tables,
         provenance=[PageTable(table, {}) for table in model.provenance],
         plots=plots,
         reasons=model.first_reasons(LISTED),
+        best=model.tables["best"].rows if "best" in model.tables else (),
         classes=classes,
     )
 

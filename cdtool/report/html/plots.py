@@ -177,11 +177,10 @@ def _share_words(item: SurvivalCurve, kept: np.ndarray, *, banded: bool) -> list
     """Return in words which share is undetected from each of the `kept` times on."""
     count, curve = item.contacts - item.not_assessable, item.curve
     words = []
-    for i in kept.tolist():
-        band = f" (95 %: {percent(curve.low[i])} to {percent(curve.high[i])})" if banded else ""
-        words.append(
-            f"{percent(curve.share[i])} of {count} undetected{band}" if curve.share[i] else f"all {count} detected"
-        )
+    for share, low, high in zip(curve.share[kept], curve.low[kept], curve.high[kept], strict=True):
+        band = f" (95 %: {percent(low)} to {percent(high)})" if banded else ""
+        is_last = share == 0.0 and item.detected == count
+        words.append(f"all {count} detected" if is_last else f"{percent(share)} of {count} undetected{band}")
     return words
 
 

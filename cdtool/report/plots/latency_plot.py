@@ -28,6 +28,7 @@ from cdtool.report.plots.figures import (
 from cdtool.report.plots.latency_axis import FLOOR_MS, LatencyAxis
 from cdtool.report.plots.side_table import SideColumn, SideTable, count_cells
 from cdtool.report.plots.style import look_of
+from cdtool.report.table import shown
 from cdtool.report.writers.base import Image, Report
 from cdtool.results.evaluated import Evaluated
 from cdtool.results.results import Results
@@ -83,11 +84,11 @@ def latency_figure(evaluated: Evaluated) -> Figure:
     known = _all_marks(evaluated.results)
     marks = {key: known[key] for key in ((item.detector, item.group) for item in summaries)}
     impact_free = list(dict.fromkeys(item.group for item in evaluated.summaries if not item.contacts))
-    more = [SideColumn(f"false alarms\nin {label(group, 11)}", 70.0) for group in impact_free]
+    more = [SideColumn(f"false alarms\nin {label(shown(group), 11)}", 70.0) for group in impact_free]
     table = SideTable((*_COLUMNS, *more))
     rows = {group: [item for item in summaries if item.group == group] for group in groups}
     names = [label(item.detector, 28) for item in summaries]
-    axis = _axis_of(list(marks.values()), evaluated.results)
+    axis = _axis_of(evaluated.results)
     explained = _explained(summaries, list(marks.values()), axis)
     bottom = 0.325 + 0.175 * len(explained.splitlines())
     margins = Margins(text_width(names, 9) + 0.15, table.width + 0.1, 0.5, bottom)
@@ -98,7 +99,7 @@ def latency_figure(evaluated: Evaluated) -> Figure:
     counts = {(item.detector, item.group): _count(item) for item in evaluated.summaries}
     for axes, group in zip(panels, groups, strict=True):
         _draw_group(axes, rows[group], marks, axis)
-        axes.set_title(label(group, 60), loc="left", fontweight="bold", y=1.0)
+        axes.set_title(label(shown(group), 60), loc="left", fontweight="bold", y=1.0)
         for i, row in enumerate(rows[group]):
             free = [counts.get((row.detector, name), NOTHING) for name in impact_free]
             _write_row(table, axes, i, row, free)
@@ -125,11 +126,10 @@ def latency_axis(results: Results) -> LatencyAxis:
     return LatencyAxis.of(np.array(late or [row.watched_ms or 0.0 for row in rows if row.outcome == "missed"]))
 
 
-def _axis_of(marks: Sequence[_Marks], results: Results) -> _Axis:
-    missed = np.concatenate([item.missed for item in marks])
+def _axis_of(results: Results) -> _Axis:
     scale = latency_axis(results)
     low, end = scale.low, scale.high
-    if not np.any(missed > end):
+    if not any(row.outcome == "missed" and (row.watched_ms or 0.0) > end for row in results.scored_contacts):
         return _Axis(scale, end)
     return _Axis(scale, end * (end / low) ** _BEYOND if scale.logarithmic else end + _BEYOND * (end - low))
 

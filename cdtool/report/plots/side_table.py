@@ -11,6 +11,7 @@ import numpy as np
 from cdtool.report.number_text import NOTHING
 from cdtool.report.plots.figures import Margins, label, stacked_panels, text_width, write
 from cdtool.report.plots.style import line_of, look_of
+from cdtool.report.table import shown
 from cdtool.results.summary import Summary
 
 if TYPE_CHECKING:
@@ -117,6 +118,6 @@ def keyed_panels(
     margins = Margins(0.75, table.width + 0.1, 0.5, bottom)
     figure, panels = stacked_panels(margins.left + size[0] + margins.right, heights, margins, gap=0.36)
     for axes, group in zip(panels, rows, strict=True):
-        axes.set_title(label(group, 60), loc="left", fontweight="bold", y=1.0)
+        axes.set_title(label(shown(group), 60), loc="left", fontweight="bold", y=1.0)
     table.write_headings(panels[0])
     return figure, panels, table

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cdtool.report.model import AXES
-from cdtool.report.number_text import number
+from cdtool.report.number_text import value_and_interval
 from cdtool.report.plots.figures import drawing, message_figure, save
 from cdtool.report.plots.latency_axis import LatencyAxis
 from cdtool.report.plots.side_table import SideColumn, count_cells, keyed_panels
@@ -51,9 +51,8 @@ def survival_figure(evaluated: Evaluated) -> Figure:
         _draw_group(axes, items, scale)
         for place, row in enumerate(of_contacts[group]):
             cells, loud = count_cells(row)
-            table.write_key(
-                axes, place, row.detector, (number(row.median.value, error=row.resolution_ms), *cells), (False, *loud)
-            )
+            median = value_and_interval(row.median, row.resolution_ms)[0]
+            table.write_key(axes, place, row.detector, (median, *cells), (False, *loud))
     panels[-1].set_xlabel(_explained(panels_of.values()), linespacing=1.4)
     return figure
 

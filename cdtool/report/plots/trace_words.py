@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from cdtool.base.plain_text import counted
 from cdtool.report.number_text import number, spoken
 from cdtool.report.plots.panels import trigger_spans
+from cdtool.report.table import shown
 from cdtool.results.results import Results
 from cdtool.results.traces.trace import ContactOutcome, Panel, Span, Trace
 
@@ -77,7 +78,7 @@ def triggers_of(trace: Trace, row: Panel, span: Span) -> list[Span]:
 def trace_words(trace: Trace) -> list[str]:
     """Return group, contact and peak force of a trace."""
     contact = trace.shown
-    words = [trace.group]
+    words = [shown(trace.group)]
     if contact is None:
         words.append("no contact")
     elif len(trace.contacts) > 1:
@@ -85,12 +86,6 @@ def trace_words(trace: Trace) -> list[str]:
     if contact and math.isfinite(contact.peak_force):
         words.append(f"peak {number(contact.peak_force)} N")
     return words
-
-
-def force_steps(results: Results, group: str) -> list[tuple[float, float]]:
-    """Return from when [s after the onset] which force [N] is allowed in a group; empty without force limits."""
-    profile = results.provenance.get("force_profiles", {}).get(group, {})
-    return [(step["from_s"], step["at_most_n"]) for step in profile.get("steps", ())]
 
 
 def _seen(trace: Trace, row: Panel) -> ContactOutcome | None:

@@ -31,7 +31,6 @@ from cdtool.report.plots.panels import (
 from cdtool.report.plots.style import LIMIT_LINE, look_of
 from cdtool.report.plots.trace_words import (
     LatencyTexts,
-    force_steps,
     rows_in_order,
     trace_words,
     triggers_of,
@@ -64,7 +63,7 @@ def trigger_figure(trace: Trace, results: Results) -> Figure:
     legend = Legend(None)
     if forced:
         draw_force(panels[0], trace.force_time, trace.force, trace.view, contact=contact is not None)
-        _draw_limits(panels[0], trace, force_steps(results, trace.group), legend)
+        _draw_limits(panels[0], trace, results, legend)
         _name(panels[0], "load cell\n[N]")
     for axes, row in zip(panels[int(forced) :], rows, strict=True):
         _draw_row(axes, trace, row, legend, _verdict(trace, row, texts))
@@ -127,13 +126,14 @@ def _name(axes: Axes, text: str) -> None:
     write(axes, text, (0.0, 0.5), (-_TICKS, 0), ha="right", va="center", fontsize=_NAME_SIZE)
 
 
-def _draw_limits(axes: Axes, trace: Trace, steps: Sequence[tuple[float, float]], legend: Legend) -> None:
+def _draw_limits(axes: Axes, trace: Trace, results: Results, legend: Legend) -> None:
     """Draw the allowed forces from the shown contact on, on the side to which it presses."""
+    steps = results.provenance.get("force_profiles", {}).get(trace.group, {}).get("steps", ())
     if not steps or trace.shown is None:
         return
     side = -1.0 if -trace.force.min() > trace.force.max() else 1.0
-    times = [trace.shown.start + begin for begin, _ in steps]
-    forces = [side * most for _, most in steps]
+    times = [trace.shown.start + step["from_s"] for step in steps]
+    forces = [side * step["at_most_n"] for step in steps]
     axes.step([*times, max(trace.end, times[-1])], [*forces, forces[-1]], where="post", **LIMIT_LINE, zorder=2)
     legend.add("limit")
 

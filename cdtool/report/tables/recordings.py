@@ -84,21 +84,6 @@ def recordings_table(results: Results) -> Table:
     return replace(table, marks={name: [mark[name] for mark in marks] for name in (marks[0] if marks else {})})
 
 
-def scored_table(results: Results) -> Table:
-    """Return the logs that were scored, with their hashes."""
-    fields: Fields[RecordingResult] = (
-        (Heading("recording"), lambda item: name_cell(item.recording)),
-        (Heading("group"), lambda item: name_cell(item.group)),
-        (Heading("contacts", numeric=True), lambda item: count_cell(item.contacts)),
-        (Heading("operations", numeric=True), lambda item: count_cell(item.operations)),
-        (Heading("length [s]", numeric=True), lambda item: number_cell(item.seconds)),
-        (Heading("campaign"), lambda item: Cell(item.campaign or "")),
-        (Heading("test point"), lambda item: Cell(item.point or "")),
-        (Heading("SHA-256"), lambda item: Cell(item.sha256)),
-    )
-    return tabulate("scored", "Recordings scored", fields, results.recordings, "recordings", (), most_rows(results))
-
-
 def contact_tables(results: Results) -> list[Table]:
     """Return the contacts that were missed, not assessable, or in progress at the start of their recording."""
     fields: Fields[ContactResult] = (

@@ -85,6 +85,7 @@ function latencyPlan(data, panel, openRecording) {
   return {
     whole,
     home: whole,
+    ticks,
     log,
     margin,
     label: `${data.axes.latency}${floored ? `; below ${whole[0]} ms drawn there` : ""}`,
@@ -153,6 +154,7 @@ function survivalPlan(data, panel, hidden) {
   return {
     whole,
     home: whole,
+    ticks,
     log,
     margin,
     label: data.axes.time,
@@ -254,7 +256,7 @@ function amocPlan(data, panel, hidden, unit) {
     home: range,
     log: true,
     margin,
-    label: `false alarms per ${unit}, in the hold-out`,
+    label: `false alarms per ${unit}`,
     draw(chart) {
       const left = margin.left - gap - zone;
       const strip = { class: "band", x: left, y: margin.top, width: zone, height: chart.bottom - margin.top };

@@ -91,9 +91,16 @@ function endOf(highest, most) {
   return Math.ceil(highest / step - 1e-9) * step;
 }
 
+/** The last and the first tick, and the others that have room between them [px]. */
+function apart(ticks, place, room) {
+  const kept = [ticks[ticks.length - 1], ticks[0]];
+  for (const tick of ticks) if (kept.every((other) => Math.abs(place(other) - place(tick)) >= room)) kept.push(tick);
+  return kept;
+}
+
 /** Round numbers for a logarithmic axis; for a short one those of a linear axis. */
 function logTicksOf(low, high, most) {
-  for (const factors of [[1, 1.5, 2, 3, 5, 7], [1, 2, 3, 5, 7], [1, 2, 5], [1, 3], [1]]) {
+  for (const factors of [[1, 2, 3, 5, 7], [1, 2, 5], [1, 3], [1]]) {
     const found = [];
     for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power += 1) {
       for (const factor of factors) found.push(factor * 10 ** power);

@@ -367,7 +367,7 @@ function makeTraceLegend(host) {
   for (const words of [
     "coloured line: signal",
     "coloured vertical line: alarm, dashed where it is false",
-    "shaded from an alarm until it is armed again: trigger on",
+    "shaded from an alarm until it is re-armed: trigger on",
   ])
     make(host, "span", {}, words);
 }
