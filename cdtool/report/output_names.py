@@ -8,7 +8,7 @@ from pathlib import Path
 from cdtool.base.errors import UsageError
 from cdtool.base.files.writing import resolved
 from cdtool.base.plain_text import plain
-from cdtool.base.remote.remote_path import is_remote
+from cdtool.report.outputs import check_parent
 
 
 def check_output_names(targets: Sequence[Path], suffixes: Sequence[str]) -> None:
@@ -20,7 +20,4 @@ def check_output_names(targets: Sequence[Path], suffixes: Sequence[str]) -> None
         if targets.count(target) > 1:
             raise UsageError(f"--output is '{plain(target)}' twice", "give each name once")
         resolved(target)
-        if not is_remote(target) and not target.parent.is_dir():
-            raise UsageError(
-                f"--output is '{plain(target)}': no folder {plain(target.parent)}", "create the folder first"
-            )
+        check_parent(target)
