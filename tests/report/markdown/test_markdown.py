@@ -97,7 +97,7 @@ def test_a_detector_that_assessed_nothing_has_no_rate_and_no_bound(results):
     short = rows(text.split("## Results")[1].split("## ")[0])
     every = rows(text.split("<summary>All results (")[1])
     assert short[-1][:1] == ["momentum"] and short[-1][4] == "**not assessable in any of 40 operations**"
-    assert every[[row[:2] for row in every].index(["momentum", "holdout"])][-3:-1] == [short[-1][4].strip("*"), "–"]
+    assert every[[row[:2] for row in every].index(["momentum", "hold-out"])][-3:-1] == [short[-1][4].strip("*"), "–"]
     assert "0 in 40" not in text
     assert "false alarms not assessable" in text
 
