@@ -6,7 +6,7 @@ import csv
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from io import SEEK_END, StringIO
+from io import StringIO
 
 from cdtool.base.plain_text import plain
 from cdtool.results.results import Results
@@ -22,10 +22,11 @@ def csv_lines(results: Results, names: Sequence[str], rows: Iterable[Sequence[ob
     With `[report] decimal = "comma"` as Excel opens a file where numbers have a comma: semicolons, and the byte order
     mark without which it reads UTF-8 as the code page of Windows.
     """
-    decimal = "," if results.provenance.get("report") == {"decimal": "comma"} else "."
-    text = StringIO("\ufeff" if decimal == "," else "")
-    text.seek(0, SEEK_END)
-    writer = csv.writer(text, delimiter=";" if decimal == "," else ",", lineterminator="\n")
+    german = results.provenance.get("report") == {"decimal": "comma"}
+    decimal = "," if german else "."
+    text = StringIO()
+    writer = csv.writer(text, delimiter=";" if german else ",", lineterminator="\n")
+    yield "\ufeff" if german else ""
     writer.writerow(names)
     for row in rows:
         yield text.getvalue()

@@ -7,38 +7,33 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from cdtool.report.number_text import NOTHING, short
-from cdtool.report.table import Table
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from cdtool.report.table import Table
 
 # Legible beside a white and a black background.
 _COLOURS = {"good": "#1f9254", "bad": "#d93a2f", "unknown": "#c98500"}
 
 
-def notebook_table(verdict: str, frame: pd.DataFrame, tone: str = "", more: str = "") -> str:
+def notebook_table(verdict: str, frame: pd.DataFrame, about: str, tone: str = "") -> str:
     """Return a frame as HTML below its verdict, which a notebook shows; of many rows the first and the last ten.
 
-    `more` is a line below the verdict. Texts are escaped; NaN is a dash, a time has milliseconds.
+    `about` is a line below the verdict. Texts are escaped; NaN is a dash, a time has milliseconds.
 
     >>> import pandas as pd
-    >>> notebook_table("All <2> limits are met", pd.DataFrame({"latency_ms": [31.0]}), "good")[:60]
+    >>> notebook_table("All <2> limits are met", pd.DataFrame({"latency_ms": [31.0]}), "gate", "good")[:60]
     '<p style="border-left: 6px solid #1f9254; padding-left: 8px">'
     """
     formats: dict[str, Callable[[Any], str]] = {
         name: "{:.3f}".format if name.endswith("_s") else short for name in map(str, frame.select_dtypes("float"))
     }
-    table = frame.to_html(
-        index=False,
-        na_rep=NOTHING,
-        formatters=formats,
-        max_rows=20,
-        show_dimensions=len(frame) > 20,
-    )
-    lines = "<br>".join(
-        (f"<strong>{escape(verdict[:1].upper() + verdict[1:])}</strong>", *([escape(more)] if more else []))
-    )
-    return f'<p style="border-left: 6px solid {_COLOURS.get(tone, "#888")}; padding-left: 8px">{lines}</p>{table}'
+    hides = len(frame) > 20
+    table = frame.to_html(index=False, na_rep=NOTHING, formatters=formats, max_rows=20, show_dimensions=hides)
+    style = f"border-left: 6px solid {_COLOURS.get(tone, '#888')}; padding-left: 8px"
+    sentence = escape(verdict[:1].upper() + verdict[1:])
+    return f'<p style="{style}"><strong>{sentence}</strong><br>{escape(about)}</p>{table}'
 
 
 def as_frame(table: Table) -> pd.DataFrame:

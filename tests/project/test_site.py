@@ -1,21 +1,33 @@
-"""The documentation site: its navigation, generated pages, link check and list of versions.
-
-The strict build itself is a step of `.ci/run`; it takes too long for a test.
-"""
+"""The documentation site: its navigation and generated pages; where the extra `docs` is installed, the built site."""
 
 from __future__ import annotations
 
 import re
 import runpy
+import subprocess
+import sys
 import tomllib
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from cdtool.commands.app import COMMANDS
 from tests.project.pages import DOCS, PAGES, ROOT
+from tests.report.html.test_html_in_browser import browser as browser
 
 SITE = DOCS / "site"
+TALLEST = 5500  # [px] of a page at a width of 1,400
+# The page that a search for a word shows first.
+EXPLAINS = {
+    **dict.fromkeys(("false alarm", "latency", "onset", "missed", "not assessable"), "docs/evaluation.html"),
+    "threshold": "docs/thresholds.html",
+    "signature": "docs/signature.html",
+    "protocol": "docs/protocol.html",
+    "debounce": "docs/benchmark-file.html",
+    "units": "docs/machine-file.html",
+    "MCAP": "docs/recordings.html",
+}
 
 
 @pytest.fixture(scope="module")
@@ -63,3 +75,23 @@ def test_equations_are_written_as_github_and_the_site_render_them():
     latex2mathml = pytest.importorskip("docutils.utils.math.latex2mathml")
     for text in blocks:
         latex2mathml.tex2mathml(text.strip(), as_block=True)
+
+
+def test_the_built_site_opens_with_a_report_and_its_search_with_what_explains_a_word(browser: Any, tmp_path: Path):
+    for name in ("sphinx", "myst_parser", "pydata_sphinx_theme", "sphinx_design", "nbclient", "ipykernel"):
+        pytest.importorskip(name)
+    subprocess.run([sys.executable, DOCS / "make_site.py", "-o", tmp_path], check=True)
+    size = {"width": 1400, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    browser.get((tmp_path / "index.html").as_uri())
+    bottom = "return document.querySelector(arguments[0]).getBoundingClientRect().bottom"
+    assert max(browser.execute_script(bottom, item) for item in (".live", "article img")) <= 900
+    assert len(browser.find_elements("css selector", ".sd-card")) == 5  # a route for each person
+    browser.implicitly_wait(20)
+    for word, page in EXPLAINS.items():
+        browser.get(f"{(tmp_path / 'search.html').as_uri()}?q={word}")
+        first = browser.find_element("css selector", "#search-results li > a")
+        assert first.get_dom_attribute("href").split("#")[0] == page, word
+    for path in set(tmp_path.rglob("*.html")) - {tmp_path / "sample-report.html"}:
+        browser.get(path.as_uri())
+        assert browser.execute_script("return document.documentElement.scrollHeight") < TALLEST, path.name

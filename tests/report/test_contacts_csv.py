@@ -76,8 +76,10 @@ def test_a_decimal_comma_is_read_back_and_stays_with_the_results(tmp_path, monke
     assert german.onset_s.dtype == "float64" and german.onset_s.notna().all()
 
 
-def test_forces_with_a_decimal_comma_are_read_back(results):
-    plain = with_forces(results, "gap; wide")
+@pytest.mark.parametrize("name", ["gap; wide", *HOSTILE.values()])
+def test_forces_with_a_decimal_comma_are_read_back(results, name):
+    plain = with_forces(results, name)
+    assert [row["step_at_most_n"] for row in read(forces_csv(plain))] == ["400.0", "150.0"]
     text = forces_csv(replace(plain, provenance={"report": {"decimal": "comma"}}))
     german = pd.read_csv(io.StringIO(text.removeprefix("\ufeff")), sep=";", decimal=",")
     pd.testing.assert_frame_equal(german, pd.read_csv(io.StringIO(forces_csv(plain))))
@@ -128,10 +130,3 @@ def test_forces_have_a_row_for_each_contact_and_step(results):
     assert (first["step"], first["step_at_most_n"], first["step_time_budget_ms"]) == ("gap", "400.0", "12.0")
     assert (second["step"], second["step_peak_n"], second["step_time_budget_ms"]) == ("static", "", "")
     assert (second["step_verdict"], second["step_reason"]) == ("not_assessable", "the record ends")
-
-
-@pytest.mark.parametrize("kind", HOSTILE)
-def test_forces_of_hostile_names_stay_in_their_cells(results, kind):
-    text = forces_csv(with_forces(results, HOSTILE[kind]))
-    assert len(text.splitlines()) == 3
-    assert [row["step_at_most_n"] for row in read(text)] == ["400.0", "150.0"]

@@ -43,16 +43,18 @@ _SHOWN = ["operation", "verdict", "alarms", "first_alarm_s", "contacts", "latenc
 class _Frames:
     """Alarms, contacts and verdicts of one log, or of several, as DataFrames."""
 
+    runs: Sequence[DetectionResult]
+
     @property
-    def _each(self) -> Sequence[DetectionResult]:
-        raise NotImplementedError
+    def _detector(self) -> str:
+        return next((item.detector for run in self.runs for item in run.detections), "no operation")
 
     @cached_property
     def alarms(self) -> pd.DataFrame:
         """A row per alarm: joint, time, side, statistic, limit, and the onset of its contact (NaN: none is known)."""
         rows = [
             alarm_row(run.detected, detection, alarm)
-            for run in self._each
+            for run in self.runs
             for detection in run.detections
             for alarm in detection.verdict.alarms
         ]
@@ -61,14 +63,14 @@ class _Frames:
     @cached_property
     def contacts(self) -> pd.DataFrame:
         """A row per contact, with the columns of a benchmark's `contacts`; `detected.contact_rows` has all."""
-        rows = [row for run in self._each for of_operation in run.detected.contact_rows for row in of_operation]
+        rows = [row for run in self.runs for of_operation in run.detected.contact_rows for row in of_operation]
         return rows_as_frame(ContactResult, rows, {"outcome": OUTCOMES})[FIRST_OF_CONTACT]
 
     def summary(self) -> pd.DataFrame:
         """Return a row per operation with its verdict."""
         rows = [
             operation_row(run.detected, *pair)
-            for run in self._each
+            for run in self.runs
             for pair in zip(run.detections, run.detected.matchings, strict=True)
         ]
         return rows_as_frame(OperationRow, rows, {"verdict": VERDICTS})
@@ -108,19 +110,15 @@ class DetectionResult(_Frames):
         return self.detected.detections
 
     @property
-    def joints(self) -> tuple[str, ...]:
-        """The monitored joints: the columns of the statistic."""
-        return self.detected.joints
-
-    @property
     def outcome(self) -> str:
         """The verdict on the log: "alarm" if any operation has one, "not_assessable" if none is assessable."""
         outcomes = {item.verdict.outcome for item in self.detections}
         return next((outcome for outcome in VERDICTS if outcome in outcomes), "not_assessable")
 
     @property
-    def _each(self) -> Sequence[DetectionResult]:
-        return [self]
+    def runs(self) -> Sequence[DetectionResult]:  # type: ignore[override]  # read only here
+        """This result alone."""
+        return (self,)
 
     def to_frame(self) -> pd.DataFrame:
         """Return the signal of all operations with its limits as a DataFrame.
@@ -137,7 +135,7 @@ class DetectionResult(_Frames):
         time = np.concatenate([np.empty(0), *(part.time for part in parts)])
         names = pd.Index([item.name for item in Status])
         columns: dict[str, object] = {}
-        for column, joint in enumerate(self.joints):
+        for column, joint in enumerate(self.detected.joints):
             curves = {
                 "statistic": [part.values[:, column] for part in parts],
                 "lower": [item.band.lower[:, column] for item in self.detections],
@@ -159,10 +157,6 @@ class DetectionResult(_Frames):
     def __repr__(self) -> str:
         return f"DetectionResult({', '.join(self._words())}; {self._detector} on {PurePath(self.recording.name).name})"
 
-    @property
-    def _detector(self) -> str:
-        return self.detections[0].detector if self.detections else "no operation"
-
     def _words(self) -> list[str]:
         alarms = sum(len(item.verdict.alarms) for item in self.detections)
         words = counted(alarms, "alarm") if alarms else self.outcome.replace("_", " ")
@@ -171,7 +165,7 @@ class DetectionResult(_Frames):
     def _repr_html_(self) -> str:
         """Return the verdict on each operation as a table, which a notebook shows."""
         about = f"{self._detector} on {self.recording.name}: {self.detected.threshold}"
-        return notebook_table(", ".join(self._words()), self.summary()[_SHOWN], more=about)
+        return notebook_table(", ".join(self._words()), self.summary()[_SHOWN], about)
 
 
 class DetectionResults(_Frames, Sequence[DetectionResult]):
@@ -207,18 +201,6 @@ class DetectionResults(_Frames, Sequence[DetectionResult]):
         self.runs, self.findings = tuple(runs), tuple(findings)
         self._skipped = tuple(skipped)
 
-    @classmethod
-    def of(cls, *found: DetectedRuns) -> DetectionResults:
-        """Return the results of the runs of several logs."""
-        runs = [DetectionResult(run) for log in found for run in log.runs]
-        return cls(
-            runs, [item for log in found for item in log.skipped], [item for log in found for item in log.findings]
-        )
-
-    @property
-    def _each(self) -> Sequence[DetectionResult]:
-        return self.runs
-
     @cached_property
     def skipped(self) -> pd.DataFrame:
         """A row per log or run that was left out, with the reason."""
@@ -246,13 +228,9 @@ class DetectionResults(_Frames, Sequence[DetectionResult]):
         left_out = [f"{len(self._skipped)} left out"] if self._skipped else []
         return ", ".join((f"{counted(alarms, 'alarm')} in {counted(len(self), 'log')}", *left_out))
 
-    @property
-    def _detector(self) -> str:
-        return self.runs[0]._detector if self.runs else "no log"
-
     def _repr_html_(self) -> str:
         """Return the verdict on each operation as a table, which a notebook shows."""
-        return notebook_table(self._verdict, self.summary()[_SHOWN], more=self._detector)
+        return notebook_table(self._verdict, self.summary()[_SHOWN], self._detector)
 
 
 @overload
@@ -353,5 +331,6 @@ def detect(
             skipped.append(Skipped(str(log), str(fault)))
     if skipped and not found:
         raise RecordingError(f"none of {counted(len(skipped), 'log')} can be used, the first: {skipped[0].reason}")
-    results = DetectionResults.of(*found)
-    return DetectionResults(results.runs, [*skipped, *results._skipped], results.findings)
+    skipped += [item for log in found for item in log.skipped]
+    findings = [item for log in found for item in log.findings]
+    return DetectionResults([DetectionResult(run) for log in found for run in log.runs], skipped, findings)

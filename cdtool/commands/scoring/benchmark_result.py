@@ -9,6 +9,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from cdtool.base.errors import UsageError, nearest
 from cdtool.base.plain_text import counted, first_of, shorten
 from cdtool.base.remote.remote_path import location
@@ -98,29 +100,9 @@ class BenchmarkResult:
         return self.frame("false_alarms")
 
     @cached_property
-    def exposure(self) -> pd.DataFrame:
-        """A row per group and detector: how long and how often it was monitored."""
-        return self.frame("exposure")
-
-    @cached_property
-    def recordings(self) -> pd.DataFrame:
-        """A row per log that was scored."""
-        return self.frame("recordings")
-
-    @cached_property
-    def limits(self) -> pd.DataFrame:
-        """A row per limit that was checked."""
-        return self.frame("limits")
-
-    @cached_property
     def skipped(self) -> pd.DataFrame:
         """A row per log or detector that was left out, with the reason."""
         return self.frame("skipped")
-
-    @cached_property
-    def findings(self) -> pd.DataFrame:
-        """A row per finding about a log that was used."""
-        return self.frame("findings")
 
     def frame(self, table: str) -> pd.DataFrame:
         """Return one kind of rows as a new DataFrame.
@@ -165,15 +147,13 @@ class BenchmarkResult:
         import pandas as pd
 
         items = (*self.evaluated.summaries, *self.evaluated.conditions)
-        names = [*_FIRST, *(name for name in FIGURES if every and name not in _FIRST)]
-        few_have_none = {name for name in names if name.startswith(("mean", "std", "p95"))}
-        values = {
-            name: [math.nan if item.few and name in few_have_none else float(_METRICS[name](item)) for item in items]
-            for name in names
-        }
+        values = {name: [float(metric(item)) for item in items] for name, metric in _METRICS.items()}
         of_rows = {"group": self.results.every_group, "detector": self.results.detectors}
         index = [pd.Categorical([getattr(item, name) for item in items], of_rows[name]) for name in of_rows]
-        return pd.DataFrame(values, index=pd.MultiIndex.from_arrays(index, names=list(of_rows)), dtype="float64")
+        frame = pd.DataFrame(values, index=pd.MultiIndex.from_arrays(index, names=list(of_rows)), dtype="float64")
+        of_many = [name for name in _METRICS if name.startswith(("mean", "std", "p95"))]
+        frame.loc[np.array([item.few for item in items], dtype=bool), of_many] = math.nan
+        return frame[[*_FIRST, *(name for name in frame if every and name not in _FIRST)]]
 
     @property
     def plot(self) -> BenchmarkPlots:
@@ -207,15 +187,9 @@ class BenchmarkResult:
         return write_outputs(report, [location(target) for target in targets], force=force, inputs=self.inputs)
 
     def __repr__(self) -> str:
-        results = self.results
-        size = ", ".join(
-            counted(len(rows), name)
-            for rows, name in (
-                (results.detectors, "detector"),
-                (results.every_group, "group"),
-                (results.recordings, "recording"),
-            )
-        )
+        found = self.results
+        counts = {"detector": found.detectors, "group": found.every_group, "recording": found.recordings}
+        size = ", ".join(counted(len(rows), name) for name, rows in counts.items())
         return f"BenchmarkResult({shorten(self.headline, 100)}; {size})"  # one line
 
     def _repr_html_(self) -> str:
@@ -225,7 +199,7 @@ class BenchmarkResult:
         from cdtool.report.tables.results import results_table
 
         rows = as_frame(results_table(self.evaluated.summaries))
-        return notebook_table(self.headline, rows, self.results.conclusion.tone, counts_text(self.evaluated))
+        return notebook_table(self.headline, rows, counts_text(self.evaluated), self.results.conclusion.tone)
 
 
 @dataclass(frozen=True)

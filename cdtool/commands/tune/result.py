@@ -68,4 +68,4 @@ class TuningResult(Tuning):
     def _repr_html_(self) -> str:
         """Return these results as a table, which a notebook shows."""
         tone, headline = self.verdict
-        return notebook_table(headline, self.summary()[_SHOWN], tone)
+        return notebook_table(headline, self.summary()[_SHOWN], counted(len(self.detectors), "detector"), tone)

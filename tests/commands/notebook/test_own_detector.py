@@ -6,35 +6,21 @@ import re
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
 import pytest
 
 import cdtool
-from cdtool.detectors.base import gain
 from cdtool.detectors.momentum import Momentum
+from cdtool.detectors.pure_torque import PureTorque
 from cdtool.execution.store.store import Store
 from tests.commands.notebook.values import FREE, GATE, LOG, MACHINE
 
 
 @dataclass(frozen=True)
-class Effort:
-    """The drive force, scaled."""
-
-    scale: float = gain(2.0, "1", "factor")
+class Effort(PureTorque):
+    """The drive force under a name of its own."""
 
     name: ClassVar[str] = "effort"
     short_name: ClassVar[str] = "ef"
-    title: ClassVar[str] = "Effort"
-    needs: ClassVar[tuple[str, ...]] = ("torque",)
-    signed: ClassVar[bool] = True
-
-    def unit(self, machine):
-        return machine.force_unit
-
-    def signal(self, recording, machine):
-        torque = recording["torque"]
-        status = np.where(np.isfinite(torque.values), cdtool.Status.VALID, cdtool.Status.GAP).astype(np.uint8)
-        return cdtool.Signal(torque.time, self.scale * torque.values, status, self.unit(machine), self.signed)
 
 
 def test_a_detector_of_ones_own_is_learned_and_detects():

@@ -74,7 +74,7 @@ def test_a_table_contains_the_results_of_each_group(evaluated):
     assert ekf[2:] == [
         "–",
         "–",
-        "34.0 (–)",
+        "34.0",
         "30.0 to 38.0",
         "–",
         "3 of 4",
@@ -85,7 +85,7 @@ def test_a_table_contains_the_results_of_each_group(evaluated):
         "3600",
     ]
     momentum = next(row for row in stiff if row[:2] == ["momentum", "stiff"])
-    assert momentum[4:6] == ["70.0 (–)", "60.0 to not reached"]
+    assert momentum[4:6] == ["70.0", "60.0 to not reached"]
     assert momentum[7:9] == ["2 of 3", "1 of 3: at most 86 %"]
     assert "Fewer than 10 contacts detected: median and range, no mean, std or P95." in text
     assert [line for line in text.splitlines() if line.startswith("## ")][:2] == ["## Results", "## Comparisons"]
