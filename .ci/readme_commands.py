@@ -52,7 +52,7 @@ def wrong(number: int, status: int, text: str) -> list[str]:
     reasons = {
         f"status {status}": status != 0,
         "a traceback": "Traceback" in text,
-        "kernels are compiled again": number > 0 and "compiling" in text,
+        "kernels are compiled again": number > 0 and "compiling kernels" in text,
         "no colour": number == 0 and "\x1b[3" not in text,
     }
     return [reason for reason, holds in reasons.items() if holds]

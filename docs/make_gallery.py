@@ -21,6 +21,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from cycler import cycler
+from matplotlib import rc_context
+
+from cdtool.detectors.look import BLUE, OCHRE, PLUM, RUST, TEAL
+from cdtool.report.plots.figures import drawing
+
 DOCS = Path(__file__).resolve().parent
 SCRIPTS = DOCS / "examples" / "gallery"
 # The order of the pages.
@@ -60,7 +66,8 @@ def run_part(code: str, names: dict[str, Any]) -> tuple[str, Any]:
     tree, value = ast.parse(code), None
     last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
     printed = io.StringIO()
-    with contextlib.redirect_stdout(printed):
+    colours = {"axes.prop_cycle": cycler(color=(BLUE, OCHRE, PLUM, TEAL, RUST))}
+    with contextlib.redirect_stdout(printed), drawing(), rc_context(colours):
         exec(compile(tree, "gallery", "exec"), names)
         if isinstance(last, ast.Expr):
             value = eval(compile(ast.Expression(last.value), "gallery", "eval"), names)
@@ -125,7 +132,6 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Run the examples of the gallery and write their pages.")
     parser.add_argument("folder", type=Path, nargs="?", default=DOCS, help="where the pages are written")
     docs = parser.parse_args().folder.resolve()
-    sys.path.insert(0, str(DOCS.parent))
     for folder in (docs / "gallery", docs / "images"):
         folder.mkdir(parents=True, exist_ok=True)
     for name in NAMES:

@@ -74,11 +74,11 @@ def budget(work: Path) -> None:
 def emps(work: Path) -> None:
     """The momentum observer on the recording with force pulses."""
     logs, machine, signature = DATA / "emps", EXAMPLES / "emps.toml", work / "emps.json"
-    cut = ("--set=operations=motion", "--set=signature.force=true")
-    learn = ("learn-signature", "DATA_EMPS.mat", "-m", machine, "-d", "gm", *cut, "-o", signature)
+    cut, few = "--set=operations=motion", "--set=signature.force=true"
+    learn = ("learn-signature", "DATA_EMPS.mat", "-m", machine, "-d", "gm", cut, few, "-o", signature)
     cdtool(*learn, folder=logs)
     image = IMAGES / "emps_pulses_gm.png"
-    cdtool("detect", "DATA_EMPS_PULSES.mat", "-m", machine, "-s", signature, *cut, "--plot", image, folder=logs)
+    cdtool("detect", "DATA_EMPS_PULSES.mat", "-m", machine, "-s", signature, cut, "--plot", image, folder=logs)
 
 
 def ur10e(_: Path) -> None:

@@ -20,6 +20,7 @@ from scipy.optimize import brentq
 from cdtool.base.arrays import FloatArray
 from cdtool.base.plain_text import counted
 from cdtool.commands.study.sensor_plot import plot_ranking
+from cdtool.detectors.look import BLUE, OCHRE, PLUM, RUST, TEAL
 from cdtool.impact.bodies import Bodies
 from cdtool.impact.collision import collide
 from cdtool.impact.contact_laws.base import ContactLaw
@@ -130,7 +131,7 @@ def _damping_ratio() -> float:
     return float(brentq(lambda zeta: float(kelvin_voigt_restitution(zeta)) - _RESTITUTION, 0.0, 1.0))
 
 
-_FIRST, _SECOND, _THIRD = "#0072B2", "#D55E00", "#009E73"
+_FIRST, _SECOND, _THIRD = BLUE, RUST, TEAL
 _COLOURS = (_FIRST, _SECOND, _THIRD)
 _LINES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.5, 1.5)))
 _TAKEN, _GIVEN = "#CFE0EE", "#F6D9C6"
@@ -165,7 +166,7 @@ def plot_restitution(curves: Sequence[RestitutionCurve]) -> Figure:
             axes.plot(curve.variable, curve.hunt_crossley, color=colour, linewidth=0.9, linestyle=(0, (4, 2)))
             _name(axes, (curve.variable[-1], curve.exact[-1]), curve.name, colour, (4, 0), va="center")
         axes.plot([], [], color="0.3", linewidth=1.6, label="Hunt-Crossley, exact")
-        axes.plot([], [], color="0.3", linewidth=0.9, linestyle=(0, (4, 2)), label="e = 1 - α v (3.21)")
+        axes.plot([], [], color="0.3", linewidth=0.9, linestyle=(0, (4, 2)), label="e = 1 − α v (3.21)")
         axes.legend(loc="upper right")
         axes.set_xlabel("approach speed v [m/s]")
         _restitution_axis(axes, float(curves[0].variable[-1]))
@@ -327,8 +328,8 @@ def _name(
     )  # fmt: skip
 
 
-_FORCE, _DEPTH, _SPEED = "black", "#0072B2", "#D55E00"
-_SERIES = ("#0072B2", "#009E73", "#E69F00", "#D55E00", "#B0569B")
+_FORCE, _DEPTH, _SPEED = "black", BLUE, RUST
+_SERIES = (BLUE, TEAL, OCHRE, RUST, PLUM)
 _DASHES = ("-", (0, (6, 2)), (0, (3, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (1, 1)))
 _BEFORE_MS = 4.0
 

@@ -23,6 +23,7 @@ from cdtool.formats.machine_file import read_machine_file
 from cdtool.formats.signature_store import write_signature
 from cdtool.recordings.recording import Recording
 from cdtool.report.plots.figures import drawing, new_figure, save
+from cdtool.report.plots.panels import cover_peak
 from cdtool.report.plots.trigger_plot import most_informative, trigger_figure
 from cdtool.results.summary import Summary
 from cdtool.results.traces.decimation import decimate
@@ -142,11 +143,13 @@ def impacts(work: Path) -> None:
             recording = cdtool.read(work / "gate" / kind / "03.csv", work / "gate" / "machine.toml")
             start = _first_force(recording, 20.0)
             window = recording.between(start - 0.2, start + 0.8)
-            for row, channel, text in ((0, "force", "load cell [N]"), (1, "acceleration", "acceleration [m/s2]")):
+            for row, channel, text in ((0, "force", "load cell [N]"), (1, "acceleration", "acceleration [m/s²]")):
                 time, values = decimate(window[channel].time - start, window[channel].values[:, 0], 1000)
                 panels[row, column].plot(1e3 * time, values, color="black", linewidth=0.9)
                 if column == 0:
                     panels[row, column].set_ylabel(text)
+                if row == 0:
+                    cover_peak(panels[row, column], float(values.max()))
             panels[0, column].set_title(f"{kind} impact", loc="left")
             panels[1, column].set_xlabel("time from contact onset [ms]")
         save(figure, IMAGES / "reproduction_5_3.png")
@@ -171,7 +174,7 @@ def accelerometer(work: Path) -> None:
             label="without gravity: link acceleration times the sensor's distance",
         )
         axes.set_xlabel("time [s]")
-        axes.set_ylabel("acceleration across\nthe arm [m/s2]")
+        axes.set_ylabel("acceleration across\nthe arm [m/s²]")
         figure.legend(loc="outside lower left", ncols=2)
         save(figure, IMAGES / "reproduction_6_6.png")
 
@@ -192,7 +195,7 @@ def triggers(done: dict[str, BenchmarkResult]) -> None:
     }
     for (machine, group), number in names.items():
         trace = most_informative([trace for trace in done[machine].traces if trace.group == group])
-        save(trigger_figure(trace), IMAGES / f"reproduction_{number}.png")
+        save(trigger_figure(trace, done[machine].results), IMAGES / f"reproduction_{number}.png")
 
 
 def write_page(parts: dict[str, str]) -> None:

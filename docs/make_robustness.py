@@ -500,7 +500,8 @@ def draw(machines: Mapping[str, Simulated], image: Path) -> None:
                             column + 0.5, line + 0.5, "" if text == "0" else text, ha="center", va="center", fontsize=6
                         )
                 axes.set_title(f"{machine}: {rule}", fontsize=9)
-                axes.set_xticks([column + 0.5 for column in range(len(STATES))], STATES, rotation=60, ha="right")
+                names = [name.replace("-", "−") for name in STATES]
+                axes.set_xticks([column + 0.5 for column in range(len(names))], names, rotation=60, ha="right")
                 axes.set_yticks([line + 0.5 for line in range(len(cells))])
                 axes.set_yticklabels(simulated.cells if axes is row[0] else [])
                 axes.invert_yaxis()

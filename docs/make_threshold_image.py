@@ -17,8 +17,10 @@ from cdtool.alarms.pipeline import Detection, judge_alone, run_detector
 from cdtool.commands.judging.runs import read_named
 from cdtool.formats.machine_file import read_machine_file
 from cdtool.recordings.operations import operations_of
+from cdtool.report.model import AXES
+from cdtool.report.number_text import number
 from cdtool.report.plots.figures import drawing, new_figure, save, unit_label
-from cdtool.report.plots.style import BAND, LIMIT, ONSET_DASHES, look_of
+from cdtool.report.plots.style import BAND, LIMIT_LINE, ONSET_DASHES, look_of
 from cdtool.thresholds import THRESHOLDS
 from cdtool.thresholds.settings import with_context
 from cdtool.thresholds.signature import Signature
@@ -60,7 +62,7 @@ def main() -> int:
             axes.set_visible(False)
         for axes in panels[len(found) - 2 : len(found)]:
             axes.tick_params(labelbottom=True)
-            axes.set_xlabel("time from the onset of the contact / ms")
+            axes.set_xlabel(AXES["time"])
         save(figure, IMAGE)
     size = IMAGE.stat().st_size
     print(f"{IMAGE.name}: {size} bytes")
@@ -77,18 +79,18 @@ def draw(axes: Any, name: str, detection: Detection, onset: float) -> None:
     low = min(0.0, float(np.nanmin(values)))
     top = 2.2 * float(np.nanmax(upper))
     axes.fill_between(time, np.maximum(lower, low), upper, color=BAND, linewidth=0)
-    axes.plot(time, upper, color=LIMIT, linewidth=1.0)
+    axes.plot(time, upper, **LIMIT_LINE)
     axes.plot(time, values, color=look_of(detection.detector).colour, linewidth=1.3)
     axes.axvline(0.0, color="black", linewidth=0.9, linestyle=ONSET_DASHES)
     after = [alarm.time - onset for alarm in detection.verdict.crossings if alarm.time >= onset]
     words = "no alarm"
     if after:
-        axes.axvline(1e3 * after[0], color=look_of(detection.detector).colour, linewidth=0.9)
-        words = f"alarm after {1e3 * after[0]:.0f} ms"
+        axes.axvline(1e3 * after[0], color=look_of(detection.detector).colour, linewidth=2.2)
+        words = f"alarm after {number(1e3 * after[0], error=1.0)} ms"
     axes.set_ylim(low - 0.03 * (top - low), top)
     axes.set_xlim(-1e3 * BEFORE, 1e3 * AFTER)
     axes.set_title(f"{name}: {words}", fontsize=9, loc="left")
-    axes.set_ylabel(NUMBERS.get(name, unit_label(statistic.unit)))
+    axes.set_ylabel(f"[{NUMBERS.get(name, unit_label(statistic.unit))}]")
 
 
 if __name__ == "__main__":

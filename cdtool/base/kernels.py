@@ -24,6 +24,7 @@ import numpy.typing as npt
 # The signature of a read-only array (n,) of float64; writable arrays fit it too.
 READ_ONLY = "Array(float64, 1, 'C', readonly=True)"
 
+_FIRST_USE = "first use: compiling kernels, which are stored; this can take a minute or two"
 _BYTES = "Array(uint8, 1, 'C', readonly=True)"
 _FIELDS: dict[Any, str] = {float: "float64", npt.NDArray[np.float64]: READ_ONLY, npt.NDArray[np.uint8]: _BYTES}
 
@@ -67,7 +68,7 @@ class Kernel:
             _tell_not_stored()
             made = numba.njit(signature, **self._options)(function)
         if made.stats.cache_misses:
-            _tell_first_use()
+            logging.getLogger(__name__).info(_FIRST_USE)
         made.disable_compile()
         return made
 
@@ -124,11 +125,6 @@ def _taken(item: Kernel) -> Iterator[bytes]:
             yield repr(value).encode()
         if isinstance(value, Kernel):
             yield from _taken(value)
-
-
-@cache
-def _tell_first_use() -> None:
-    logging.getLogger(__name__).info("first use: kernels are compiled and stored, which can take a minute or two")
 
 
 @cache

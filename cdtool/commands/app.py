@@ -24,7 +24,7 @@ from cdtool.base.errors import CdtoolError
 from cdtool.base.exit_status import ExitStatus, Fact, help_epilog, status_of, statuses_words
 from cdtool.base.plain_text import counted, one_line
 from cdtool.base.remote import session
-from cdtool.commands.console.streams import lost_output, open_standard_streams
+from cdtool.commands.console.streams import Pace, lost_output, open_standard_streams
 
 _GROUPS: Mapping[str, Mapping[str, tuple[str, str]]] = {
     "start": {
@@ -183,21 +183,12 @@ def _end_of(number: int) -> BaseException:
     return KeyboardInterrupt() if number == signal.SIGINT else SystemExit(128 + number)
 
 
-class _LineHandler(logging.Handler):
-    """Print each message as a line on stderr, above a progress bar if there is one."""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Print the message of a record."""
-        typer.echo(one_line(record.getMessage()), err=True)
-
-
 @contextmanager
 def showing_first_use() -> Iterator[None]:
-    """Show in the block that kernels are compiled; nothing is shown if stderr is not a terminal."""
-    before, handler = _LOGGER.level, _LineHandler()
-    if sys.stderr.isatty():
-        _LOGGER.addHandler(handler)
-        _LOGGER.setLevel(logging.INFO)
+    """Show in the block that kernels are compiled."""
+    before, handler = _LOGGER.level, Pace()
+    _LOGGER.addHandler(handler)
+    _LOGGER.setLevel(logging.INFO)
     try:
         yield
     finally:

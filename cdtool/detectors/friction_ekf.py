@@ -22,7 +22,7 @@ from cdtool.detectors.base import (
 from cdtool.detectors.detection import Signal, Status, StatusArray
 from cdtool.detectors.filters import unsettled
 from cdtool.detectors.friction_ekf_kernel import Bounds, Samples, Variances, run_filter
-from cdtool.detectors.look import RED, Look
+from cdtool.detectors.look import RUST, Look
 from cdtool.machines.dynamics import Gain, JointEquation, Machine
 from cdtool.recordings.clock.lost_samples import lost_samples
 from cdtool.recordings.recording import Recording
@@ -121,7 +121,7 @@ class FrictionEkf:
     needs: ClassVar[tuple[str, ...]] = ("torque", "speed", "acceleration")
     signed: ClassVar[bool] = False
     contact_torque: ClassVar[bool] = False
-    look: ClassVar[Look] = Look(RED, "o")
+    look: ClassVar[Look] = Look(RUST, "o")
 
     def __post_init__(self) -> None:
         require_positive(

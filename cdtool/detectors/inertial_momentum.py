@@ -22,7 +22,7 @@ from cdtool.detectors.base import (
     single,
 )
 from cdtool.detectors.detection import Signal, Status
-from cdtool.detectors.look import ORANGE, Look
+from cdtool.detectors.look import OCHRE, Look
 from cdtool.machines.dynamics import Gain, Machine
 from cdtool.recordings.clock import HOLD_PERIODS
 from cdtool.recordings.clock.recent_steps import usual_steps
@@ -92,7 +92,7 @@ class InertialMomentum:
     needs: ClassVar[tuple[str, ...]] = ("torque", "speed", "acceleration")
     signed: ClassVar[bool] = True
     contact_torque: ClassVar[bool] = True
-    look: ClassVar[Look] = Look(ORANGE, "v")
+    look: ClassVar[Look] = Look(OCHRE, "v")
 
     def __post_init__(self) -> None:
         require_positive(self, "bandwidth", "crossover", "damping")

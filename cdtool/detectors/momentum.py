@@ -14,7 +14,7 @@ from cdtool.detectors.base import (
     require_positive,
 )
 from cdtool.detectors.detection import Signal
-from cdtool.detectors.look import VIOLET, Look
+from cdtool.detectors.look import PLUM, Look
 from cdtool.machines.dynamics import Gain, Machine
 from cdtool.recordings.recording import Recording
 
@@ -74,7 +74,7 @@ class Momentum:
     needs: ClassVar[tuple[str, ...]] = ("torque", "speed")
     signed: ClassVar[bool] = True
     contact_torque: ClassVar[bool] = True
-    look: ClassVar[Look] = Look(VIOLET, "D")
+    look: ClassVar[Look] = Look(PLUM, "D")
 
     def __post_init__(self) -> None:
         require_positive(self, "bandwidth")

@@ -9,7 +9,7 @@ import numpy as np
 
 from cdtool.detectors.base import require_channels
 from cdtool.detectors.detection import Signal, Status
-from cdtool.detectors.look import GREEN, Look
+from cdtool.detectors.look import TEAL, Look
 from cdtool.machines.dynamics import Machine
 from cdtool.recordings.recording import Recording
 
@@ -47,7 +47,7 @@ class PureInertia:
     needs: ClassVar[tuple[str, ...]] = ("acceleration",)
     signed: ClassVar[bool] = True
     contact_torque: ClassVar[bool] = False
-    look: ClassVar[Look] = Look(GREEN, "^")
+    look: ClassVar[Look] = Look(TEAL, "^")
 
     def unit(self, machine: Machine) -> str:
         """Return "m/s2" or "rad/s2"."""

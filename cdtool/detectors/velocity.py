@@ -22,7 +22,7 @@ from cdtool.detectors.base import (
 )
 from cdtool.detectors.detection import Signal, Status, StatusArray
 from cdtool.detectors.filters import SETTLED
-from cdtool.detectors.look import SKY, Look
+from cdtool.detectors.look import STEEL, Look
 from cdtool.machines.dynamics import Gain, Machine
 from cdtool.recordings.recording import Recording
 
@@ -87,7 +87,7 @@ class Velocity:
     needs: ClassVar[tuple[str, ...]] = ("torque", "speed")
     signed: ClassVar[bool] = True
     contact_torque: ClassVar[bool] = True
-    look: ClassVar[Look] = Look(SKY, "<")
+    look: ClassVar[Look] = Look(STEEL, "<")
 
     def __post_init__(self) -> None:
         require_positive(self, "bandwidth")

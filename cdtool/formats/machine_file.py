@@ -36,6 +36,7 @@ class MachineFile(StoresDerived):
     """A validated machine file: the machine, its channels, and gains that differ from the defaults.
 
     `model`: the table [model] as `machines.axis_model.model_table.ModelTable`, None if the file does not have one.
+    `simulated`: it says that its logs are.
     """
 
     path: Path
@@ -45,14 +46,14 @@ class MachineFile(StoresDerived):
     gains: Mapping[str, Mapping[str, Gain]]
     digest: str
     model: Any = None
+    simulated: bool = False
 
     def __repr__(self) -> str:
         return f"MachineFile({str(self.path)!r}: {self.machine.name}, joints {', '.join(self.machine.joints)})"
 
     @property
     def _sources(self) -> tuple[ChannelSource, ...]:
-        maps = (self.columns, self.topics)
-        return tuple(item for each in maps for item in (*each.sources, *each.beside))
+        return tuple(item for each in (self.columns, self.topics) for item in (*each.sources, *each.beside))
 
     @property
     def force_reduction(self) -> str:
@@ -93,6 +94,7 @@ class MachineFile(StoresDerived):
 class MachineTable:
     """A machine file as it is written, without [machine]: its keys depend on the type."""
 
+    simulated: Annotated[bool, setting("the logs are simulated, not recorded: reports say so")] = False
     channels: Annotated[Any, setting("where the channels are in a log")] = None
     csv: Annotated[dict[str, Any] | None, setting("the dialect of text tables, where it is not found")] = None
     detectors: Annotated[dict[str, dict[str, Any]], setting("gains that differ from the defaults")] = field(
@@ -145,7 +147,7 @@ def read_machine_file(path: str | Path) -> MachineFile:
     assert machine is not None
     topics = replace(topics, named=len(joints) > 1 or "joints" in values["machine"])
     digest = hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
-    return MachineFile(file, machine, columns, topics, gains, digest, model)
+    return MachineFile(file, machine, columns, topics, gains, digest, model, table.simulated)
 
 
 def _machine(values: Mapping[str, Any], place: Place) -> Machine | None:

@@ -139,7 +139,7 @@ def _kind(item: Summary) -> Case:
     """Return the figures of one kind of contact; limits on it are cases of their own."""
     words = f"{item.detected} of {counted(item.contacts, 'contact')} detected, {item.missed} missed"
     words += f", {item.not_assessable} not assessable" if item.not_assessable else ""
-    latency = f"; median latency {number(item.median_ms)} ms" if item.assessable else ""
+    latency = f"; median latency {number(item.median_ms, error=item.resolution_ms)} ms" if item.assessable else ""
     return Case(f"{item.detector}.{item.group}", lines=(words + latency,))
 
 
@@ -152,10 +152,11 @@ def _contact(item: ContactResult) -> str:
     kind = f" ({item.kind})" if item.kind else ""
     words = f"contact {item.contact}{kind} at {item.onset_s:.3f} s: {spoken(item.outcome)}"
     if item.latency_ms is not None:
-        words += f" after {number(item.latency_ms)} ms"
+        words += f" after {number(item.latency_ms, error=item.resolution_ms)} ms"
         words += " (before the onset, within its uncertainty)" if item.clipped else ""
         if item.onset_hole_ms is not None:
-            words += f" or up to {number(later_ms(item))} ms later (load-cell samples missing at the onset)"
+            later = number(later_ms(item), error=item.resolution_ms)
+            words += f" or up to {later} ms later (load-cell samples missing at the onset)"
     if item.force_at_alarm_n is not None:
         words += f" at {number(item.force_at_alarm_n)} N"
     if item.peak_force_n is not None:

@@ -23,8 +23,8 @@ EXPLAINED: Final = (
 )
 # With five times as many, slow cases cost the interval of a mean little of its coverage (docs/statistics.md).
 SLOW: Final = (
-    f"Mean of fewer than {5 * FEWEST} contacts: if 5 to 15 % of all contacts are slow, its 95 % interval contains "
-    "the true mean in 72 to 91 of 100 tests."
+    f"Mean of fewer than {5 * FEWEST} contacts: slow ones are easily absent. If 5 to 15 % of all contacts are slow, "
+    "its 95 % interval contains the true mean in 72 to 91 of 100 tests."
 )
 GROUPED: Final = (
     f"No interval if fewer than {FEWEST} recordings or campaigns contain several contacts each: those of one are alike."
@@ -65,7 +65,11 @@ def open_end(item: Summary) -> tuple[float, str] | None:
         least = item.min_ms if item.median.value == math.inf else math.nan
     else:
         least = item.median.low if item.median.high == math.inf else math.nan
-    return (least, f"≥ {number(least)} (n = {item.assessable})") if math.isfinite(least) else None
+    return (
+        (least, f"≥ {number(least, error=item.resolution_ms)} (n = {item.assessable})")
+        if math.isfinite(least)
+        else None
+    )
 
 
 def grouped(rows: Iterable[Summary]) -> bool:

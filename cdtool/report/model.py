@@ -12,6 +12,7 @@ from typing import Any
 
 from cdtool.base.plain_text import counted, shorten
 from cdtool.base.registry import Registry
+from cdtool.report.best import BEST, best_table
 from cdtool.report.few_contacts import explained
 from cdtool.report.many import is_many, plotted_groups
 from cdtool.report.number_text import NOT_ASSESSABLE, NOTHING, number
@@ -22,15 +23,14 @@ from cdtool.report.tables.conditions import conditions_table
 from cdtool.report.tables.provenance import provenance_tables
 from cdtool.report.tables.results import (
     calibration_table,
+    comparisons_note,
     comparisons_table,
-    differences_note,
-    differences_table,
+    every_result_table,
     kinds_table,
+    limits_in_words,
     limits_table,
     part_of,
     results_table,
-    short_results_table,
-    too_few_note,
 )
 from cdtool.report.tables.worst_cases import worst_cases_table
 from cdtool.results.evaluated import Evaluated
@@ -40,6 +40,7 @@ from cdtool.results.results import ContactResult, Results
 SECTIONS = Registry("section of a report", {"injected": "cdtool.commands.inject.report_table:InjectedSection"})
 
 NO_CERTIFICATE = "This is evidence from recordings, not a certificate of safety."
+SIMULATED = "simulated recordings"
 UNCHECKED = "Values to be checked against the standard."
 AXES = {
     "latency": "latency from contact onset to alarm [ms]",
@@ -48,8 +49,8 @@ AXES = {
     "force": "force [N]",
 }
 TITLES = {
+    "page": "Collision detection",
     "attention": "What needs attention",
-    "limits": "Limits",
     "results": "Results",
     "latency": "Latency of each contact",
     "survival": "Share of contacts undetected over time",
@@ -59,10 +60,9 @@ TITLES = {
     "force": "Force",
     "recordings": "Recordings",
     "cases": "Worst and failed cases",
-    "not_assessable": "Not assessable",
     "left_out": "Left out and warnings",
     "calibration": "False-alarm budget",
-    "provenance": "Provenance",
+    "provenance": "Details and provenance",
 }
 # Where only the worst and the failed cases are listed.
 TITLES_OF_MANY = {"latency": "Distribution of the latency", "recordings": TITLES["cases"]}
@@ -79,7 +79,7 @@ _NOTES = {
     ),
     "amoc": (
         "Each point is a safety factor; the ringed point is in use. False alarms are those of the impact-free "
-        "operations. Left of the line there is no false alarm; this does not mean a rate of zero, and the upper bound "
+        "operations. The strip 0 has the points without any; this does not mean a rate of zero, and the upper bound "
         "is given below. Open points: contacts were missed. A triangle at the top: the median is not reached."
     ),
     "comparisons": (
@@ -89,9 +89,8 @@ _NOTES = {
         "none."
     ),
     "force": (
-        "Load cell as it was read, over the time since the onset; verdicts use the force corrected for its reading at "
-        "rest and for the mass before the cell. Coloured: the contact with the highest peak, and the detectors' "
-        "alarms on it."
+        "Load cell minus its reading at rest, over the time since the onset; verdicts are corrected for the mass "
+        "before the cell too. Coloured: the worst contact, and the detectors' alarms on it."
     ),
     "calibration": (
         "Each factor was set on impact-free operations, each assessed with a threshold that was not learned from it."
@@ -107,10 +106,9 @@ _NOTES = {
         "the change. After each value: that of the unchanged machine. These recordings count in no other statistic, "
         "and in no limit that does not name them."
     ),
-    "short_results": (
-        "Median with its 95 % interval if there are enough contacts; missed contacts count as later than all others. "
-        "“At most”: one-sided 95 % bound. Force at alarm: median of the detected contacts. All other values are in "
-        "“All results” below."
+    "results": (
+        "Median, range and P95 count a missed contact as later than all others. Force at alarm: median of the detected "
+        "contacts."
     ),
     "provenance": "All results with all their digits, and the hash of every recording, are in results.json.",
 }
@@ -141,19 +139,20 @@ class ProfileText:
 class Model:
     """The plain values of a report. Texts from files are unchanged: renderers escape them.
 
-    `tone` of the headline is good, bad, unknown, or empty if nothing was required. `scope`: version, machine, number of
-    detectors and recordings. `tables`: by name, those
-    with rows; `groups`: the results of each group with its name; `failed`: the recordings that need attention, the
-    worst first (of very many, those that are listed); `notes`: how to read each part.
+    `tone` of the headline is good, bad, unknown, or empty if nothing was required. `simulated`: what says that the
+    recordings are; empty if nothing does. `scope`: version, machine, number of detectors and recordings. `reasons`:
+    the limits that are not met first. `tables`: by name, those with rows; `failed`: the
+    recordings that need attention, the worst first (of very many, those that are listed); `notes`: how to read each
+    part.
     """
 
     headline: str
     counts: str
     tone: str
+    simulated: str
     scope: tuple[str, ...]
     reasons: tuple[str, ...]
     tables: Mapping[str, Table]
-    groups: tuple[tuple[str, Table], ...]
     provenance: tuple[Table, ...]
     profiles: Mapping[str, ProfileText]
     failed: tuple[Log, ...]
@@ -186,33 +185,31 @@ def report_model(evaluated: Evaluated, traced: Collection[Log] = ()) -> Model:
         attention_table(results, failed),
         limits_table(results, met=False),
         limits_table(results, met=True),
-        short_results_table(summaries),
-        results_table(results, summaries),
+        best_table(evaluated),
+        results_table(summaries),
+        every_result_table(results, summaries),
         kinds_table(results, evaluated.kinds),
         conditions_table(evaluated),
         *(SECTIONS.load(name).table(evaluated) for name in SECTIONS.names()),
         comparisons_table(evaluated),
-        differences_table(evaluated),
         forces.groups_table(results),
         forces.points_table(results),
         *([cases] if cases else [forces.contacts_table(results), recordings.recordings_table(results)]),
         forces.contacts_table(results, only_exceptions=True),
-        recordings.scored_table(results),
         *recordings.contact_tables(results),
         recordings.false_alarms_table(results),
         recordings.not_assessable_table(results),
         *recordings.reasons_tables(results),
         calibration_table(results),
     )
-    groups = {group: [item for item in summaries if item.group == group] for group in results.groups}
     return Model(
         headline=results.conclusion.headline,
         counts=counts_text(evaluated),
         tone=results.conclusion.tone,
+        simulated=SIMULATED if provenance.get("simulated") is True else "",
         scope=tuple(part for part in scope if part),
-        reasons=results.conclusion.reasons,
+        reasons=(*limits_in_words(results), *results.conclusion.reasons),
         tables={table.name: table for table in tables if table.rows},
-        groups=tuple((group, results_table(results, items, group)) for group, items in groups.items()),
         provenance=tuple(provenance_tables(results)),
         profiles=_profiles(results),
         failed=tuple(dict.fromkeys(_bad_logs(cases) if cases else (item.log for item in failed))),
@@ -221,9 +218,9 @@ def report_model(evaluated: Evaluated, traced: Collection[Log] = ()) -> Model:
             **(_NOTES_OF_MANY if many else {}),
             "groups": _groups_note(evaluated) if many else "",
             "cases": f"{counts} {_ALL_OF_THEM}" if many else "",
-            "results": _results_note(evaluated),
-            "too_few": too_few_note(evaluated),
-            "differences": differences_note(evaluated) if evaluated.comparisons else "",
+            "best": f"{BEST} {NO_CERTIFICATE}",
+            "all_results": _results_note(evaluated),
+            "pairs": comparisons_note(evaluated),
         },
     )
 
@@ -280,9 +277,8 @@ def _results_note(evaluated: Evaluated) -> str:
     note = (
         f"Latency: from the onset of the contact ({onset}) to the sample that raised the alarm, debounce "
         f"included{resolution}. In brackets: 95 % interval; “{NOTHING}” means no value. Mean and std are those of the "
-        "detected contacts. Median and P95 count a missed contact as later than all others. “At most” is the one-sided "
-        "95 % bound. Force at alarm: median of the detected contacts. Peak force: median of all contacts. Read a "
-        "latency together with missed, not assessable and false alarms."
+        "detected contacts, peak force is the median of all contacts. Read a latency together with missed, not "
+        "assessable and false alarms."
     )
     return f"{note} {explained(evaluated.summaries)}".rstrip()
 

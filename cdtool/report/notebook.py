@@ -7,6 +7,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from cdtool.report.number_text import NOTHING, short
+from cdtool.report.table import Table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,3 +33,14 @@ def notebook_table(verdict: str, frame: pd.DataFrame, about: str, tone: str = ""
     style = f"border-left: 6px solid {_COLOURS.get(tone, '#888')}; padding-left: 8px"
     sentence = escape(verdict[:1].upper() + verdict[1:])
     return f'<p style="{style}"><strong>{sentence}</strong><br>{escape(about)}</p>{table}'
+
+
+def as_frame(table: Table) -> pd.DataFrame:
+    """Return a table of the report as a DataFrame of its texts; the heading of a part is a row of its own."""
+    import pandas as pd
+
+    names = [column.heading for column in table.columns]
+    rows = [[cell.line for cell in row] for row in table.rows]
+    for place, part in [*table.parts.items()][::-1]:
+        rows.insert(place, [part.line, *[""] * (len(names) - 1)])
+    return pd.DataFrame(rows, columns=names)

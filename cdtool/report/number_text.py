@@ -1,7 +1,9 @@
 """Numbers as text: "38.0 (36.2 to 41.5)", "not reached" where infinite, "–" where there is no value.
 
-Conventions: three significant digits, those of the value for its bounds too; never an exponent. Functions that return
-several texts return a value and what follows it, each with the punctuation that joins it to the text before it.
+Conventions: three significant digits, those of the value for its bounds too; fewer where the error of the value is
+known: no digit is finer than the first one of its error. Ties are rounded away from zero; never an exponent. Functions
+that return several texts return a value and what follows it, each with the punctuation that joins it to the text before
+it.
 """
 
 from __future__ import annotations
@@ -21,9 +23,13 @@ def spoken(word: str) -> str:
     return word.replace("_", " ")
 
 
-def number(value: float | None, digits: int = 3) -> str:
-    """Return a number with the given count of significant digits."""
-    return NOTHING if value is None else _written(value, _decimals(value, digits))
+def number(value: float | None, digits: int = 3, error: float | None = None) -> str:
+    """Return a number with the given count of significant digits, none finer than its error.
+
+    >>> number(27.5), number(27.5, error=2.0), number(2.44, error=0.2), number(1858.3)
+    ('27.5', '28', '2.4', '1858')
+    """
+    return NOTHING if value is None else _written(value, _decimals(value, digits, error))
 
 
 def short(value: float) -> str:
@@ -35,13 +41,16 @@ def short(value: float) -> str:
     return plain_digits(float(f"{value:.3g}"))
 
 
-def with_interval(interval: Interval) -> str:
+def with_interval(interval: Interval, error: float | None = None) -> str:
     """Return a value with its interval; "(–)" where there is too little data for one."""
-    return "".join(value_and_interval(interval))
+    return "".join(value_and_interval(interval, error))
 
 
-def value_and_interval(interval: Interval) -> tuple[str, ...]:
-    """Return a value and its interval in brackets; an interval without an upper end is in two parts."""
+def value_and_interval(interval: Interval, error: float | None = None) -> tuple[str, ...]:
+    """Return a value and its interval in brackets; an interval without an upper end is in two parts.
+
+    `error` of the values behind it; that of a mean is half its interval, if that is less.
+    """
     if not interval.known:
         return (NOTHING,)
     width = interval.high - interval.low
@@ -49,7 +58,9 @@ def value_and_interval(interval: Interval) -> tuple[str, ...]:
     least = max(1e-12, 1e-9 * width if math.isfinite(width) else 0.0)
     parts = [0.0 if abs(item) < least else item for item in (interval.value, interval.low, interval.high)]
     leading = next((item for item in (parts[0], parts[2], parts[1]) if item and math.isfinite(item)), 0.0)
-    value, low, high = (_written(item, _decimals(leading)) for item in parts)
+    if error is not None and math.isfinite(width):
+        error = min(error, 0.5 * width)
+    value, low, high = (_written(item, _decimals(leading, error=error)) for item in parts)
     if low == high == NOT_REACHED:
         return (NOT_REACHED,)
     if low == high == NOTHING:
@@ -77,10 +88,12 @@ def rate(count: int, interval: Interval, at_most: float) -> tuple[str, ...]:
 def _written(value: float, decimals: int) -> str:
     if math.isnan(value):
         return NOTHING
-    return f"{value:z.{decimals}f}" if math.isfinite(value) else NOT_REACHED
+    # A tie that arithmetic left just below itself, as 26.499999999999996, is one too.
+    return f"{value * (1.0 + 1e-12):z.{decimals}f}" if math.isfinite(value) else NOT_REACHED
 
 
-def _decimals(value: float, digits: int = 3) -> int:
+def _decimals(value: float, digits: int = 3, error: float | None = None) -> int:
     if not math.isfinite(value) or value == 0.0:
         return 0
-    return max(digits - 1 - math.floor(math.log10(abs(value))), 0)
+    finest = -math.floor(math.log10(error)) if error else math.inf
+    return int(max(min(digits - 1 - math.floor(math.log10(abs(value))), finest), 0))

@@ -36,11 +36,23 @@ def check_outputs(targets: Sequence[Path], *, force: bool = False, subject: Subj
             _check_folder(target, force=force)
             continue
         writer = _writer_of(target, subject)
-        check_parent(target)
+        _check_parent(target)
         writer.check(target)
         if not writer.writes_folder:
             for path in writer.files(target):
                 refuse_other_kind(path, writer.kinds[path.suffix.lower()], force=force)
+
+
+def check_output_names(targets: Sequence[Path], suffixes: Sequence[str]) -> None:
+    """Raise UsageError for a name with another suffix, a name given twice, or one in a folder that does not exist."""
+    for target in targets:
+        if target.suffix.lower() not in suffixes:
+            *others, last = suffixes
+            raise UsageError(f"--output is '{plain(target)}'", f"the name must end in {', '.join(others)} or {last}")
+        if targets.count(target) > 1:
+            raise UsageError(f"--output is '{plain(target)}' twice", "give each name once")
+        resolved(target)
+        _check_parent(target)
 
 
 def write_outputs(
@@ -177,11 +189,10 @@ def _check_folder(target: Path, *, force: bool) -> None:
         return
     if target.exists():
         raise UsageError(f"--output '{plain(target)}' exists and is not a folder", "choose another name")
-    check_parent(target)
+    _check_parent(target)
 
 
-def check_parent(target: Path) -> None:
-    """Raise UsageError if the folder of a file to be written does not exist or is not writable."""
+def _check_parent(target: Path) -> None:
     if is_remote(target):
         check_place(target)
         return

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TypeVar
 
 from cdtool.report.number_text import NOTHING, number, spoken, value_and_interval
@@ -24,14 +24,13 @@ _JOINTS = " ,;:"
 class Heading:
     """A column; `numeric` columns are right-aligned and begin with their largest number when sorted.
 
-    `choice`: readers may select one of its values. `below`: where width is scarce, it is shown in small print below the
-    column to its left. `names_row`: its cells can be the heading of their row, as a name can and an outcome cannot.
+    `choice`: readers may select one of its values. `names_row`: its cells can be the heading of their row, as a name
+    can and an outcome cannot.
     """
 
     heading: str
     numeric: bool = False
     choice: bool = False
-    below: bool = False
     names_row: bool = True
 
 
@@ -67,7 +66,7 @@ class Table:
     """A table under its title; `source` names its rows in results.json.
 
     `marks`: by a property that readers may select, whether each row has it. `logs`: the recording of each row.
-    `more` rows are not shown, because there are too many.
+    `more` rows are not shown, because there are too many. `parts`: the heading of each part, by its first row.
     """
 
     name: str
@@ -78,6 +77,7 @@ class Table:
     marks: Mapping[str, Sequence[bool]] = field(default_factory=dict)
     logs: Sequence[Log] = ()
     more: int = 0
+    parts: Mapping[int, Cell] = field(default_factory=dict)
 
     @property
     def counted_title(self) -> str:
@@ -93,21 +93,6 @@ class Table:
         """Return the cells below a heading."""
         place = [column.heading for column in self.columns].index(heading)
         return [row[place] for row in self.rows]
-
-    def narrow(self) -> Table:
-        """Return the table with each `below` column in small print below the one to its left."""
-        columns: list[Heading] = []
-        rows: list[list[Cell]] = [[] for _ in self.rows]
-        for place, column in enumerate(self.columns):
-            if column.below:
-                columns[-1] = replace(columns[-1], heading=f"{columns[-1].heading}, {column.heading}")
-                for made, row in zip(rows, self.rows, strict=True):
-                    made[-1] = _joined(made[-1], column.heading, row[place])
-            else:
-                columns.append(column)
-                for made, row in zip(rows, self.rows, strict=True):
-                    made.append(row[place])
-        return replace(self, columns=columns, rows=rows)
 
 
 def tabulate(
@@ -130,14 +115,14 @@ def count_cell(count: int, tone: str = "") -> Cell:
     return Cell(str(count), key=count, tone=tone if count else "")
 
 
-def number_cell(value: float | None) -> Cell:
-    """Return the cell of a number without an interval."""
-    return Cell(number(value), key=key_of(value))
+def number_cell(value: float | None, error: float | None = None) -> Cell:
+    """Return the cell of a number without an interval, with no digit finer than its error."""
+    return Cell(number(value, error=error), key=key_of(value))
 
 
-def interval_cell(interval: Interval) -> Cell:
+def interval_cell(interval: Interval, error: float | None = None) -> Cell:
     """Return the cell of a value with its interval; one without an upper end takes two lines of small print."""
-    value, *details = value_and_interval(interval)
+    value, *details = value_and_interval(interval, error)
     return Cell(value, tuple(details), key_of(interval.value))
 
 
@@ -169,11 +154,5 @@ def tone_of(outcome: str) -> str:
 
 
 def shown(name: object) -> str:
-    """Return a name from a file as a text that is never empty."""
-    return str(name) or "(no name)"
-
-
-def _joined(above: Cell, heading: str, cell: Cell) -> Cell:
-    if cell.text == NOTHING:
-        return above
-    return replace(above, details=(*above.details, f"; {heading}: {cell.text}", *cell.details))
+    """Return a name from a file as a text that is never empty; the group `holdout` as texts call it."""
+    return {"": "(no name)", "holdout": "hold-out"}.get(str(name), str(name))

@@ -23,7 +23,8 @@ class Agreement:
     infinite where most contacts are missed, NaN where none is assessable. `range_ms`: the same with the error of the
     model, or with the 95 % interval of the median if that is wider. `assumed`: the assumptions that differ, and the
     error of the model. `real_group`: what the benchmark file compares it with, or None. `injected_count`,
-    `real_count`: assessable contacts; the missed ones count in the median as later than all.
+    `real_count`: assessable contacts; the missed ones count in the median as later than all. `resolution_ms`: that of
+    the latencies, None if unknown.
     """
 
     detector: str
@@ -35,6 +36,7 @@ class Agreement:
     real_group: str | None
     real_ms: float
     real_count: int
+    resolution_ms: float | None
 
     @property
     def is_range(self) -> bool:
@@ -119,6 +121,7 @@ def _agreement(
         real_group=None if real is None else real.group,
         real_ms=math.nan if real is None else _median(real),
         real_count=0 if real is None else real.detected + real.missed,
+        resolution_ms=max((row.resolution_ms for row in rows if row.resolution_ms), default=None),
     )
 
 

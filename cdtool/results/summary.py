@@ -34,7 +34,7 @@ class Summary:
     `in_progress` contacts are not among `contacts`: they had begun when the recording did. `onset_holes` of the
     contacts may have begun where load-cell samples are missing: their latencies may be up to `later_ms` longer. In
     `force_holes` the peak may be unseen.
-    `alarming` of the operations have a false alarm.
+    `alarming` of the operations have a false alarm. `resolution_ms`: no latency is finer than this; None if unknown.
     """
 
     detector: str
@@ -69,6 +69,7 @@ class Summary:
     later_ms: float = 0.0
     force_holes: int = 0
     alarming: int = 0
+    resolution_ms: float | None = None
 
     @property
     def watched(self) -> bool:
@@ -377,6 +378,7 @@ def _summary(
         later_ms=max((later_ms(item) for item in detected), default=0.0),
         force_holes=sum(item.force_hole_ms is not None for item in contacts),
         alarming=len({(item.recording, item.operation) for item in alarms}),
+        resolution_ms=max((item.resolution_ms for item in contacts if item.resolution_ms), default=None),
     )
 
 

@@ -24,7 +24,8 @@ class TracedForce:
     """One contact: load-cell force (n,) [N] at times (n,) [s after the onset], decimated, and its verdict.
 
     The force is the cell's reading minus that at rest, positive if it presses; unlike the verdict it is not corrected
-    for a mass before the cell. `alarms`: seconds from the onset to each detector's alarm.
+    for a mass before the cell. `alarms`: seconds from the onset to each detector's alarm. `trace`: the number of its
+    trace.
     """
 
     recording: str
@@ -34,6 +35,7 @@ class TracedForce:
     force: FloatArray
     verdict: ForceVerdict
     alarms: Mapping[str, float]
+    trace: int = 0
 
     @property
     def name(self) -> str:
@@ -93,13 +95,13 @@ def traced_forces(results: Results, traces: Sequence[Trace]) -> tuple[TracedForc
         if seen.latency_ms is not None:
             alarms.setdefault((*key, seen.contact), {})[seen.detector] = 1e-3 * seen.latency_ms
     found = []
-    for trace in traces:
+    for place, trace in enumerate(traces):
         for number, contact, until in _contacts(trace, onsets.get((trace.group, trace.log), {})):
             of = (trace.group, trace.log, number)
             row, curve = verdicts.get(of), _curve(trace, contact, until)
             if row is not None and curve is not None:
                 late = alarms.get(of, {})
-                found.append(TracedForce(trace.log, trace.group, number, *curve, _verdict(row, *curve), late))
+                found.append(TracedForce(trace.log, trace.group, number, *curve, _verdict(row, *curve), late, place))
     return tuple(found)
 
 

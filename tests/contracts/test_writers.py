@@ -13,7 +13,7 @@ from cdtool.commands.compare.comparison import compare
 from cdtool.commands.protocol.assessment.assessment import assess_point, judge
 from cdtool.commands.protocol.assessment.plan import MachineParticulars, MeasuringPoint, TestPlan
 from cdtool.commands.protocol.assessment.protocol import FileDigest, Protocol
-from cdtool.commands.protocol.document.document import ProtocolReport
+from cdtool.commands.protocol.document.document import protocol_document
 from cdtool.report.outputs import check_outputs, write_outputs
 from cdtool.report.writers import WRITERS, known_suffixes, writer_of
 from cdtool.report.writers.base import Report, Subject
@@ -38,7 +38,7 @@ def reports(request) -> dict[str, object]:
     return {
         "benchmark": benchmark,
         "comparison": compare(builds[0], builds[1]),
-        "protocol": ProtocolReport(_protocol(added)),
+        "protocol": protocol_document(_protocol(added)),
     }
 
 

@@ -254,7 +254,7 @@ def the_examples_of_explain_are_what_it_prints(printed: Printed) -> None:
     explained = [out for line, out in printed.items() if line.startswith("cdtool explain ")]
     assert len(shown) == 2
     for text, out in zip(shown, explained, strict=True):
-        assert [line.rstrip() for line in out.split("\nplot written")[0].rstrip().splitlines()] == text.splitlines()
+        assert [line.rstrip() for line in out.split("\nwritten: ")[0].rstrip().splitlines()] == text.splitlines()
 
 
 def the_ranking_of_the_study_is_what_it_prints(printed: Printed) -> None:

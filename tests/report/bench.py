@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from cdtool.alarms.pipeline import Detection
 from cdtool.commands.detecting.detection import Detected
+from cdtool.commands.judging.judged_operation import Judged, contact_rows
 from cdtool.recordings.operations import operations_of
 from cdtool.recordings.recording import Recording
 from cdtool.results.results import ContactResult
@@ -27,7 +28,9 @@ class Bench:
     def detected(self, recording: Recording, name: str) -> Detected:
         detection, contacts = self.detect(recording, name), tuple(find_contacts(recording, RULE))
         matching = match(detection.verdict, contacts, detection.statistic)
-        return Detected(recording, (detection,), contacts, (matching,), "limit 1 N set by hand")
+        judged = Judged("", operations_of(recording)[0], contacts, (detection,), (matching,))
+        rows = tuple(contact_rows(judged, recording, contacts, {}, 0.0))
+        return Detected(recording, (detection,), contacts, (matching,), "limit 1 N set by hand", contact_rows=(rows,))
 
     def trace(self, recording: Recording, group: str, names: Sequence[str] = NAMES) -> Trace:
         detections = tuple(self.detect(recording, name) for name in names)

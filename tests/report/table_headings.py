@@ -17,5 +17,5 @@ def unnamed(page: str) -> list[str]:
         if head.count('<th scope="col"') != head.count("<th "):
             found.append(head)
         rows = re.findall(r"<tr.*?</tr>", body, re.DOTALL)
-        found += [row for row in rows if not row.count('<th scope="row"') == row.count("<th") == 1]
+        found += [row for row in rows if not row.count('<th scope="row') == row.count("<th") == 1]
     return found

@@ -51,6 +51,29 @@ def test_an_interval_has_the_digits_of_its_value(interval, text):
     assert with_interval(interval) == text
 
 
+@pytest.mark.parametrize(
+    "value, error, text",
+    [
+        (27.5, 2.05, "28"),
+        (26.499999999999996, 2.0, "27"),
+        (25.000000000000355, 2.0, "25"),
+        (2.44, 0.2, "2.4"),
+        (27.5, 0.2, "27.5"),
+        (0.031, 20.0, "0"),
+        (27.5, 0.0, "27.5"),
+        (-26.5, 2.0, "-27"),
+    ],
+)
+def test_no_digit_is_finer_than_the_error(value, error, text):
+    assert number(value, error=error) == text
+    assert with_interval(Interval(value, NAN, NAN), error) == f"{text} (–)"
+
+
+def test_the_mean_of_many_contacts_has_the_digits_of_its_own_error():
+    assert with_interval(Interval(33.333, 32.93, 33.73), 2.05) == "33.3 (32.9 to 33.7)"
+    assert with_interval(Interval(33.333, 25.0, 41.0), 2.05) == "33 (25 to 41)"
+
+
 def test_no_missed_contact_is_a_bound_and_not_zero():
     assert "".join(missed(0, 30, 1 - 0.05 ** (1 / 30))) == "0 of 30: at most 9.5 %"
     assert missed(0, 0, NAN) == ("–",)
@@ -59,5 +82,5 @@ def test_no_missed_contact_is_a_bound_and_not_zero():
 
 def test_a_rate_without_an_alarm_is_only_its_bound():
     assert "".join(rate(0, Interval(0.0, 0.0, 37.0), 29.957)) == "0: at most 30.0"
-    assert "".join(rate(1, Interval(10.0, 0.25, 55.7), 47.44)) == "10.0 (0.2 to 55.7): at most 47.4"
+    assert "".join(rate(1, Interval(10.0, 0.25, 55.7), 47.44)) == "10.0 (0.3 to 55.7): at most 47.4"
     assert "".join(rate(0, Interval(NAN, 0.0, INF), NAN)) == "–"

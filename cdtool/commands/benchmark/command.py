@@ -11,7 +11,7 @@ import typer
 
 from cdtool.base.errors import UsageError
 from cdtool.base.plain_text import counted
-from cdtool.commands.console.console import leave, plain, print_json, print_line, print_skipped, progress
+from cdtool.commands.console.console import leave, plain, print_json, print_line, print_next, print_skipped, progress
 from cdtool.commands.console.options import (
     BudgetOption,
     ClusterOption,
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
     from cdtool.commands.scoring.benchmark_result import StoreReport
     from cdtool.results.evaluated import Evaluated
+    from cdtool.results.results import Results
 
 
 def benchmark(
@@ -105,23 +106,35 @@ def benchmark(
     evaluated: Evaluated = done.evaluated
     try:
         command = _command(file, protocol, output or [], detectors, false_alarm_budget, settings or [])
-        evaluated = documents.verdict_of(done, command)
+        evaluated = documents.verdict_of(done, shlex.join(command))
         lines = documents.write(done.inputs)
     finally:  # a protocol that cannot be made does not cost the reports
         report = Report(evaluated, done.traces)
-        written = write_reports(report, documents.reports, force=force, quiet=quiet, inputs=done.inputs)
-    print_skipped(done.results.skipped, done.results.findings)
+        write_reports(report, documents.reports, force=force, quiet=quiet, inputs=done.inputs)
     if as_json:
+        print_skipped(done.results.skipped, done.results.findings)
         typer.echo(to_json(evaluated.results), nl=False)
     else:
-        show_results(evaluated, written, quiet=quiet, more=_stored(done.stored))
-        injected = [] if quiet else REPORT_SECTIONS.load("injected").lines(evaluated)
-        for line in [*injected, *lines]:
+        injected = REPORT_SECTIONS.load("injected").lines(evaluated)
+        show_results(evaluated, documents.reports, quiet=quiet, more=[*injected, *_stored(done.stored)])
+        for line in lines:
             print_line(line)
-        if not lines and done.results.forces and not quiet:
-            print_line("next, for a test protocol of these forces:")
-            typer.echo(f"  cdtool protocol init {shlex.quote(plain(file))} -o protocol.toml")
+        if not lines and not quiet:
+            _show_next(file, evaluated.results, command, is_written=bool(output))
     finish(evaluated)
+
+
+def _show_next(file: Path, results: Results, command: list[str], *, is_written: bool) -> None:
+    """Print how the first missed contact or false alarm is explained, or else how a report or protocol is made."""
+    settings = command[command.index("--set") :] if "--set" in command else []
+    wrong: list[Any] = [*(item for item in results.contacts if item.outcome == "missed"), *results.false_alarms]
+    logs = ((file.parent / item.recording, item.detector) for item in wrong)
+    if found := next((pair for pair in logs if pair[0].exists()), None):
+        print_next("cdtool", "explain", found[0], "-b", file, "-d", found[1], *settings)
+    elif not is_written:
+        print_next(*command, "-o", "report/")
+    elif results.forces:
+        print_next("cdtool", "protocol", "init", file, "-o", "protocol.toml")
 
 
 def _command(
@@ -131,14 +144,14 @@ def _command(
     detectors: str | None,
     false_alarm_budget: str | None,
     settings: list[str],
-) -> str:
+) -> list[str]:
     """Return the command with the options that determine a protocol; of the outputs only their names."""
     options = [("-p", protocol), ("--detectors", detectors), ("--false-alarm-budget", false_alarm_budget)]
     given = [(name, value) for name, value in options if value is not None] + [
         ("-o", Path(path.name)) for path in output
     ]
     given += [("--set", text) for text in settings]
-    return shlex.join(["cdtool", "benchmark", str(file), *(str(word) for pair in given for word in pair)])
+    return ["cdtool", "benchmark", str(file), *(str(word) for pair in given for word in pair)]
 
 
 def _stored(outcomes: StoreReport | None) -> list[str]:

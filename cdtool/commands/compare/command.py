@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from textwrap import wrap
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cdtool.base.exit_status import Fact
 from cdtool.base.plain_text import LISTED, shorten
-from cdtool.commands.console.colour import coloured, shows_colour
-from cdtool.commands.console.console import columns_to_fill, fits_terminal, leave, plain, table
+from cdtool.commands.console.console import detector_table, leave, print_written, say
 from cdtool.commands.console.options import ForceOption, JsonOption, QuietOption
 from cdtool.commands.console.place import Place, location
 
@@ -102,38 +100,38 @@ def compare(
         typer.echo(to_json(found), nl=False)
     else:
         _show(found, quiet=quiet, fail_if_later=fail_if_later)
-        for path in () if quiet else targets:
-            typer.echo(f"written: {plain(path)}")
+        print_written(() if quiet else targets)
     later = {Fact.LATER} if fail_if_later and found.later else set()
     leave(facts={*(found.facts if require_power else set(found.facts) & {Fact.WORSE}), *later})
 
 
 def _show(found: BuildComparison, *, quiet: bool, fail_if_later: bool) -> None:
-    """Print what is missing from one file, the numbers, each row in words, the differences, and the verdict.
+    """Print the verdict, what is missing from one file, the numbers, each row in words, and the differences.
 
     If `quiet`, of the rows only those that are worse, and no table.
     """
+    tone = _TONES.get(found.verdict, "good")
+    if found.later and tone != "bad":
+        tone = "bad" if fail_if_later else "unknown"
+    say(found.words, tone=tone)
+    if not quiet:
+        typer.echo()
     for which, names in (("old", found.only_old), ("new", found.only_new)):
         for name in names:
-            _say(f"only in {which}, not compared: {name}")
+            say(f"only in {which}, not compared: {name}")
     if not quiet:
         _show_table(found)
     _show_rows([row for row in found.rows if not quiet or _TONES.get(row.outcome) == "bad"])
     if not quiet:
         _show_differences(found)
-    tone = _TONES.get(found.verdict, "")
-    if found.later and tone != "bad":
-        tone = "bad" if fail_if_later else "unknown"
-    _say(found.words, tone)
 
 
 def _show_table(found: BuildComparison) -> None:
-    from cdtool.commands.compare.comparison_model import both, contacts_of, ranges_of
+    from cdtool.commands.compare.comparison_model import both, contacts_of
     from cdtool.detectors import DETECTORS
-    from cdtool.report.few_contacts import EXPLAINED
     from cdtool.report.number_text import NOTHING
 
-    heads = ("contacts", "latency\nms", "range\nms", "missed", "n.a.", "false\nalarms", "force at\nalarm N")
+    heads = ("contacts", "latency\nms", "missed", "not\nassessable", "false\nalarms", "force at\nalarm N")
     columns = [("group", "left"), ("detector", "left"), *((name, "right") for name in heads)]
     figures: tuple[Figure, ...] = ("missed", "not_assessable", "false_alarms", "force_at_alarm_n")
     rows = [
@@ -142,20 +140,16 @@ def _show_table(found: BuildComparison) -> None:
             shorten(row.detector, _LONGEST_DETECTOR),
             contacts_of(row),
             both(row, "latency_ms"),
-            ranges_of(row),
             *(both(row, figure) for figure in figures),
         )
         for row in found.rows
     ]
-    cells = [[cell.replace(NOTHING, "-") for cell in row] for row in rows]
-    short = {} if fits_terminal(columns, cells) else {name: brief for brief, name in DETECTORS.short_names.items()}
-    table(columns, [[row[0], short.get(row[1], row[1]), *row[2:]] for row in cells])
-    used = {name: short[name] for name in dict.fromkeys(row.detector for row in found.rows) if name in short}
+    assessed = all(row[5] in (NOTHING, "0 / 0") for row in rows)  # an empty column is left out
+    cells = [(*row[:5], "" if assessed else row[5], *row[6:]) for row in rows]
+    used = detector_table(columns, cells, {name: brief for brief, name in DETECTORS.short_names.items()})
     if used:
-        _say("; ".join(f"{brief}: {name}" for name, brief in used.items()))
-    _say("old / new; contacts: the same number in both unless two are given; n.a.: not assessable")
-    if any(row.few for row in found.rows):
-        _say(EXPLAINED)
+        say("; ".join(f"{brief}: {name}" for brief, name in DETECTORS.short_names.items() if name in used))
+    say("old / new, or one number for both; latency: mean, or median below ten contacts")
     typer.echo()
 
 
@@ -163,17 +157,17 @@ def _show_rows(rows: Sequence[BuildRow]) -> None:
     for rows_alike in _alike(rows):
         first = rows_alike[0]
         alike = ", ".join(shorten(row.detector, 2 * _LONGEST_DETECTOR) for row in rows_alike)
-        _say(f"{shorten(first.group, 2 * _LONGEST_GROUP)}, {alike}: {first.words}", _TONES.get(first.outcome, ""))
+        where = f"{shorten(first.group, 2 * _LONGEST_GROUP)}, {alike}"
+        say(f"{where}: {first.words}", tone=_TONES.get(first.outcome, ""))
 
 
 def _show_differences(found: BuildComparison) -> None:
-    typer.echo()
     for item in found.changed[:LISTED]:
-        _say(f"differs: {item.key}: {item.old}, now {item.new}")
+        say(f"differs: {item.key}: {item.old}, now {item.new}")
     if len(found.changed) > LISTED:
-        _say(f"differs: and {len(found.changed) - LISTED} more settings")
+        say(f"differs: and {len(found.changed) - LISTED} more settings")
     for note in found.notes:
-        _say(note)
+        say(note)
 
 
 def _alike(rows: Sequence[BuildRow]) -> list[list[BuildRow]]:
@@ -182,9 +176,3 @@ def _alike(rows: Sequence[BuildRow]) -> list[list[BuildRow]]:
     for row in rows:
         found.setdefault((row.group, row.words), []).append(row)
     return list(found.values())
-
-
-def _say(text: str, tone: str = "") -> None:
-    """Print a sentence in lines that fit the terminal; longer names are split over several lines."""
-    for line in wrap(plain(text), columns_to_fill(), subsequent_indent="  ", break_on_hyphens=False):
-        typer.echo(coloured(line, tone), color=shows_colour())

@@ -8,8 +8,9 @@ from __future__ import annotations
 import os
 import sys
 from dataclasses import dataclass
+from typing import TextIO
 
-# Bold red, yellow, green: the names that rich and typer share.
+# Bold red, yellow, green.
 _COLOURS: dict[str, str] = {"bad": "red", "unknown": "yellow", "good": "green"}
 
 
@@ -25,25 +26,19 @@ class Toned:
         return str(self.text)
 
 
-def shows_colour() -> bool:
-    """Return whether standard output shows colours: a terminal that is not dumb, unless the environment decides."""
+def shows_colour(stream: TextIO | None = None) -> bool:
+    """Return whether a stream shows colours: a terminal that is not dumb, unless the environment decides."""
     if os.environ.get("NO_COLOR"):
         return False
     if os.environ.get("FORCE_COLOR"):
         return True
-    return sys.stdout.isatty() and os.environ.get("TERM") != "dumb"
+    return (stream or sys.stdout).isatty() and os.environ.get("TERM") != "dumb"
 
 
-def style_of(cell: object) -> str:
-    """Return the style that rich gives a cell; empty without a tone."""
-    colour = _COLOURS.get(cell.tone, "") if isinstance(cell, Toned) else ""
-    return f"bold {colour}" if colour == "red" else colour
-
-
-def coloured(line: str, tone: str) -> str:
-    """Return a line with the colour of its tone; unchanged where colours are not shown."""
-    if not tone or not shows_colour():
-        return line
+def coloured(text: str, tone: str, stream: TextIO | None = None) -> str:
+    """Return a text with the colour of its tone, "heading" for bold; unchanged where the stream shows no colours."""
+    if not (text and tone and shows_colour(stream)):
+        return text
     from typer import style
 
-    return style(line, fg=_COLOURS[tone], bold=tone == "bad")
+    return style(text, fg=_COLOURS.get(tone), bold=tone in ("bad", "heading"))

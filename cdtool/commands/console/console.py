@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import re
+import shlex
 import shutil
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
-from pathlib import PurePath
-from textwrap import fill
-from time import perf_counter
+from itertools import zip_longest
+from pathlib import Path, PurePath
+from textwrap import TextWrapper, wrap
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -22,19 +24,21 @@ from cdtool.base.exit_status import Fact, status_of
 from cdtool.base.files.strict_json import strict_json
 from cdtool.base.plain_text import LINE_LENGTH, LISTED, counted, one_line, reason_line, shorten_names, shorten_paths
 from cdtool.base.plain_text import plain as plain
-from cdtool.commands.console.colour import coloured, shows_colour, style_of
+from cdtool.commands.console.colour import coloured
+from cdtool.commands.console.streams import Pace
+from cdtool.report.number_text import NOTHING
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from cdtool.base.findings import Finding
     from cdtool.commands.detecting.detection import Detected
     from cdtool.execution.workers import Progress
     from cdtool.results.results import RecordingFinding, Skipped
 
 _ERROR = "error: "
+# The first word of a line that says how bad it is.
+_TONES = {"error": "bad", "loss": "unknown", "warning": "unknown", "left out": "unknown", "not assessable": "unknown"}
 # Columns: a narrower terminal cannot show a table; longer lines are hard to read.
-_NARROWEST, _WIDEST = 60, 100
+_NARROWEST, _WIDEST = 60, 120
 # Gap between two columns [characters].
 _GAP = 2
 
@@ -59,17 +63,38 @@ def print_error(fault: CdtoolError) -> None:
 
 def print_line(text: str, *, err: bool = False) -> None:
     """Print a line to stdout or stderr; a terminal gets it wrapped at words, without splitting names."""
-    if (sys.stderr if err else sys.stdout).isatty():
-        indent = text[: len(text) - len(text.lstrip())]
-        text = _wrapped(text.lstrip(), max(shutil.get_terminal_size().columns, _NARROWEST), indent)
-    typer.echo(text, err=err)
+    stream = sys.stderr if err else sys.stdout
+    if stream.isatty():
+        text = _wrapped(text, max(shutil.get_terminal_size().columns, _NARROWEST))
+    word, colon, rest = text.partition(":")
+    typer.echo(coloured(word, _TONES.get(word, ""), stream) + colon + rest, err=err, color=True)
 
 
-def _wrapped(text: str, width: int, indent: str = "") -> str:
-    more = f"{indent}  "
-    return fill(
-        text, width, initial_indent=indent, subsequent_indent=more, break_long_words=False, break_on_hyphens=False
-    )
+def print_next(*words: object, first: str = "next") -> None:
+    """Print a command to run next, quoted for a shell; on a terminal it continues on lines that fit."""
+    # The stars of a pattern are for the shell.
+    lines = [" ".join("*".join(part and shlex.quote(part) for part in plain(word).split("*")) for word in words)]
+    if sys.stdout.isatty() and os.name != "nt":  # the shells of Windows continue lines in other ways
+        width = columns_to_fill() - len(first) - len(":  \\")
+        together = re.sub(r" (-\S+) ", " \\1\xa0", lines[0])  # an option and its value
+        lines = wrap(together, width, break_long_words=False, break_on_hyphens=False)
+    typer.echo(f"{first}: " + f" \\\n{' ' * (len(first) + 2)}".join(lines).replace("\xa0", " "))
+
+
+def print_written(targets: Iterable[Path], first: str = "report.html") -> None:
+    """Print the files that were written, and of a folder how many it has and which one to open first."""
+    for target in targets:
+        if target.is_dir() and (target / first).exists():
+            files = counted(sum(1 for _ in target.iterdir()), "file")
+            print_line(f"{files} in {plain(target)}/; open {plain(target / first)}")
+        else:
+            print_line(f"written: {plain(target)}")
+
+
+def _wrapped(text: str, width: int) -> str:
+    indent = " " * (len(text) - len(text.lstrip()))
+    wrapper = TextWrapper(width, indent, f"{indent}  ", break_long_words=False, break_on_hyphens=False)
+    return wrapper.fill(text.lstrip())
 
 
 def print_json(value: Any) -> None:
@@ -153,13 +178,13 @@ def print_not_assessable(logs: Iterable[tuple[str, Detected]]) -> list[Fact]:
 
 def say(text: str, indent: str = "", tone: str = "") -> None:
     """Print a sentence to stdout in lines that fit the terminal; names are not split. `tone`: its colour."""
-    typer.echo(coloured(_wrapped(plain(text), columns_to_fill(), indent), tone), color=shows_colour())
+    typer.echo(coloured(_wrapped(indent + plain(text), columns_to_fill()), tone), color=True)
 
 
 def columns_to_fill() -> int:
-    """Return the terminal's width, 60 to 100; 100 without a terminal, so that redirected output is reproducible."""
+    """Return the width of sentences: the terminal's, 60 to 120; 100 without a terminal."""
     if not sys.stdout.isatty():
-        return _WIDEST
+        return 100  # of redirected sentences, which are the same on every machine
     return min(max(shutil.get_terminal_size().columns, _NARROWEST), _WIDEST)
 
 
@@ -168,39 +193,61 @@ def table(columns: Sequence[tuple[str, str]], rows: Sequence[Sequence[object]], 
 
     The first left-aligned columns name a row. Columns that do not fit follow below, with the names repeated.
     """
-    from rich.console import Console
-    from rich.table import Table as RichTable
-    from rich.text import Text
-
     kept = [i for i in range(len(columns)) if not rows or any(str(row[i]) for row in rows)]
     shown = [columns[i] for i in kept]
-    cells = [[plain(row[i]) for i in kept] for row in rows]
-    styles = [[style_of(row[i]) for i in kept] for row in rows]
+    cells = [[plain(row[i]).replace(NOTHING, "-") for i in kept] for row in rows]
+    tones = [[getattr(row[i], "tone", "") for i in kept] for row in rows]
     widths = _widths(shown, cells)
     width = _room(widths)
+    if title:
+        say(title, tone="heading")
     for number, block in enumerate(column_blocks(widths, width)):
-        made: Table = RichTable(
-            box=None, title=title or None, title_justify="left", title_style="bold", padding=(0, _GAP, 0, 0)
-        )
-        made.pad_edge = False
-        fits = sum(widths[i].needed + _GAP for i in block) <= width + _GAP
-        for i in block:
-            heading, side = shown[i]
-            is_right = side == "right"
-            made.add_column(
-                heading, justify="right" if is_right else "left", overflow="fold", no_wrap=fits and _stays(widths[i])
-            )
-        for row, looks in zip(cells, styles, strict=True):
-            made.add_row(*(Text(row[i], style=looks[i]) for i in block))
         if number:
             typer.echo()
-        Console(width=width, highlight=False, no_color=not shows_colour()).print(made)
+        sizes = _sizes([widths[i] for i in block], width)
+        sides = [shown[i][1] for i in block]
+        headings = [shown[i][0].split("\n")[::-1] for i in block]
+        for line in [*zip_longest(*headings, fillvalue="")][::-1]:
+            _print_row(line, sizes, sides, ["heading"] * len(block))
+        for row, looks in zip(cells, tones, strict=True):
+            parts = [wrap(row[i], size, break_on_hyphens=False) for i, size in zip(block, sizes, strict=True)]
+            for line in zip_longest(*parts, fillvalue=""):
+                _print_row(line, sizes, sides, [looks[i] for i in block])
 
 
-def fits_terminal(columns: Sequence[tuple[str, str]], rows: Sequence[Sequence[object]]) -> bool:
-    """Return whether `table` shows all columns side by side; always without a terminal."""
+def _sizes(columns: Sequence[ColumnWidth], width: int) -> list[int]:
+    """Return the widths of columns side by side: sentences share what the others leave, a long name is folded."""
+    sizes = [column.needed for column in columns]
+    left = width + _GAP - sum(size + _GAP for size in sizes)
+    if left < 0:
+        longest = max(sizes)
+        sizes[sizes.index(longest)] = max(longest + left, 1)
+    for i, column in enumerate(columns if left > 0 else ()):
+        sizes[i] += min(left, column.natural - column.needed)
+        left -= sizes[i] - column.needed
+    return sizes
+
+
+def _print_row(cells: Sequence[str], sizes: Sequence[int], sides: Sequence[str], tones: Sequence[str]) -> None:
+    parts = []
+    for text, size, side, tone in zip(cells, sizes, sides, tones, strict=True):
+        padding = " " * (size - len(text))
+        parts.append(padding + coloured(text, tone) if side == "right" else coloured(text, tone) + padding)
+    typer.echo((" " * _GAP).join(parts).rstrip(), color=True)
+
+
+def detector_table(
+    columns: Sequence[tuple[str, str]], rows: Sequence[Sequence[Any]], short: Mapping[str, str]
+) -> set[str]:
+    """Print a table with a detector in its second column; return those that have their short names in it.
+
+    They have if the columns do not fit side by side, never without a terminal.
+    """
     widths = _widths(columns, [[plain(cell) for cell in row] for row in rows])
-    return len(column_blocks(widths, _room(widths))) == 1
+    is_narrow = len(column_blocks(widths, _room(widths))) > 1
+    used = {row[1] for row in rows} & set(short) if is_narrow else set()
+    table(columns, [[row[0], short[row[1]] if row[1] in used else row[1], *row[2:]] for row in rows])
+    return used
 
 
 def _widths(columns: Sequence[tuple[str, str]], cells: Sequence[Sequence[str]]) -> list[ColumnWidth]:
@@ -218,11 +265,6 @@ def _room(widths: Sequence[ColumnWidth]) -> int:
     return max(160, sum(item.needed + _GAP for item in widths))
 
 
-def _stays(column: ColumnWidth) -> bool:
-    """Whether a column never wraps because its needed width is its natural width."""
-    return column.needed == column.natural
-
-
 def number(value: float | None, digits: int = 3) -> str:
     """Return a number for a table, or a dash if it is missing or not finite."""
     if value is None or not math.isfinite(value):
@@ -233,13 +275,17 @@ def number(value: float | None, digits: int = 3) -> str:
 
 @contextmanager
 def progress(what: str, *, pulses: bool = False, quiet: bool = False) -> Iterator[Progress | None]:
-    """Show a progress bar on stderr; yield None and draw nothing if stderr is not a terminal, or if `quiet`.
+    """Show a progress bar on stderr, or a line per minute if stderr is not a terminal; `quiet`: yield None.
 
     `pulses`: it moves while the total is unknown, drawn by a thread. Otherwise it is drawn only as the work advances:
     with another thread in this process, the processes of --jobs could not be forked (execution/processes.py).
     """
-    if quiet or not sys.stderr.isatty():
+    if quiet:
         yield None
+        return
+    if not sys.stderr.isatty():
+        pace = Pace()
+        yield lambda done, total: pace.show(f"{what}: {done} of {total}")
         return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
@@ -248,13 +294,10 @@ def progress(what: str, *, pulses: bool = False, quiet: bool = False) -> Iterato
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Bar(*columns, console=Console(stderr=True), transient=True, auto_refresh=pulses) as bar:
         task = bar.add_task(what, total=None)
-        drawn = -math.inf
+        pace = Pace(0.1)  # s: more is not seen
 
         def advance(done: int, total: int) -> None:
-            nonlocal drawn
-            now = perf_counter()
-            is_due = not pulses and (now - drawn > 0.1 or done == total)  # s: more is not seen
-            drawn = now if is_due else drawn
+            is_due = not pulses and (done == total or pace.is_due())
             bar.update(task, completed=done, total=total, refresh=is_due)
 
         bar.refresh()

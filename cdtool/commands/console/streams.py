@@ -8,13 +8,41 @@ from __future__ import annotations
 
 import errno
 import io
+import logging
 import os
 import sys
 from pathlib import Path
+from time import monotonic
 from typing import TextIO
 
 _STANDARD_INPUT_OUTPUT_ERROR = range(3)
 _IS_WINDOWS = os.name == "nt"
+
+
+class Pace(logging.Handler):
+    """Lines on stderr about progress: at most one per minute, or `every` s, the first one at once on a terminal."""
+
+    def __init__(self, every: float = 60.0) -> None:  # s
+        super().__init__()
+        self._every = every
+        self._due = monotonic() + (0.0 if sys.stderr.isatty() else every)
+
+    def is_due(self) -> bool:
+        """Return whether a line is due; the next one then is due later."""
+        now = monotonic()
+        if now < self._due:
+            return False
+        self._due = now + self._every
+        return True
+
+    def show(self, line: str) -> None:
+        """Print a line if one is due."""
+        if self.is_due():
+            print(line, file=sys.stderr, flush=True)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Print the message of a record if one is due."""
+        self.show(record.getMessage())
 
 
 class _Descriptor(io.FileIO):

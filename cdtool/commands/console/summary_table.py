@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import typer
@@ -11,8 +12,9 @@ import typer
 from cdtool.base.exit_status import Fact
 from cdtool.base.plain_text import LISTED, counted
 from cdtool.commands.console.colour import Toned
-from cdtool.commands.console.console import fits_terminal, leave, number, print_line, say, table
-from cdtool.commands.console.truth_shown import show_truth
+from cdtool.commands.console.console import detector_table, leave, print_line, say
+from cdtool.report.number_text import NOTHING, number, percent
+from cdtool.report.table import shown
 
 if TYPE_CHECKING:
     from cdtool.report.few_contacts import LatencyColumn
@@ -20,7 +22,6 @@ if TYPE_CHECKING:
     from cdtool.results.evaluated import Evaluated
     from cdtool.results.results import CalibrationResult
     from cdtool.results.summary import Summary
-    from cdtool.statistics.interval import Interval
 
 _HEADINGS = {
     "mean": "mean ms\n(95 %)",
@@ -29,6 +30,7 @@ _HEADINGS = {
     "range": "range\nms",
     "P95": "P95\nms",
 }
+_COUNTED = ("missed", "not\nassessable", "false\nalarms")
 # Shorter headings of changed conditions, and what precedes the value of the unchanged machine in a cell.
 _CONDITION_HEADINGS = {
     "alarming impact-free runs": "alarming",
@@ -40,36 +42,22 @@ _UNCHANGED = "; unchanged "
 
 def show_table(evaluated: Evaluated) -> None:
     """Print the thesis's table 5.1 for each group, with the notes needed to read its numbers."""
-    from cdtool.report.few_contacts import explained, latency_columns
     from cdtool.report.model import onset_words
     from cdtool.report.tables.results import part_of
     from cdtool.results.conclusion import partly_unassessed
 
-    shown = latency_columns(evaluated.summaries)
-    bounded = any(item.few and not math.isnan(item.median.low) for item in evaluated.summaries)
-    headings = _HEADINGS | ({"median": "median ms\n(95 %)"} if bounded else {})
-    columns = [("group", "left"), ("detector", "left")]
-    names = (*(headings[name] for name in shown), "n", "missed", "n.a.", "false\nalarms", "ops")
-    columns += [(name, "right") for name in names]
-    short = part_of(evaluated.results.provenance, "short_names")
-    used = _detector_table(columns, [_row(item, shown) for item in evaluated.summaries], short)
+    provenance = evaluated.results.provenance
+    short = part_of(provenance, "short_names")
+    say(f"latency from contact onset to alarm; onset: {onset_words(provenance)}")
+    used = _show_summaries(evaluated.summaries, "group", short)
     if evaluated.kinds:
-        used |= _show_kinds(evaluated.kinds, short)
+        typer.echo()
+        used |= _show_summaries(evaluated.kinds, "group/kind", short)
     if evaluated.conditions:
         used |= _show_conditions(evaluated, short)
     if used:
         say("; ".join(f"{short[name]}: {name}" for name in evaluated.results.detectors if name in used))
-    provenance = evaluated.results.provenance
-    # Mean and spread are those of the detected contacts.
-    *most, last = (name for name in shown if name in ("median", "range", "P95"))
-    with_misses = f"{', '.join(most)} and {last}" if most else last
-    say(
-        "latency from contact onset to alarm, debounce included; n: contacts detected; n.a.: not assessable; "
-        f"{with_misses} count missed contacts; ops: operations scored; onset: {onset_words(provenance)}"
-    )
-    few = explained(evaluated.summaries)
-    if few:
-        say(few)
+    _show_statistics(evaluated.summaries)
     if provenance.get("watched_joints"):
         say(f"joints monitored, of all: {provenance['watched_joints']}")
     for item in evaluated.results.calibration:
@@ -83,29 +71,19 @@ def show_table(evaluated: Evaluated) -> None:
         say(f"{counted(len(others), 'recording')} scored with thresholds learned from the other recordings")
     for line in partly_unassessed(evaluated.results, evaluated.summaries)[:LISTED]:
         say(line)
-    show_truth(evaluated)
-    _show_bounds(evaluated)
     _show_forces(evaluated.results)
 
 
-def _detector_table(
-    columns: Sequence[tuple[str, str]], rows: Sequence[Sequence[Any]], short: Mapping[str, str]
-) -> set[str]:
-    """Print a table with a detector in its second column; return those that have their short names in it."""
-    used = set() if fits_terminal(columns, rows) else {row[1] for row in rows} & set(short)
-    table(columns, [[row[0], short[row[1]] if row[1] in used else row[1], *row[2:]] for row in rows])
-    return used
-
-
-def _show_kinds(kinds: Sequence[Summary], short: Mapping[str, str]) -> set[str]:
-    """Print one row per detector and kind of contact; false alarms belong to no kind."""
+def _show_summaries(items: Sequence[Summary], heading: str, short: Mapping[str, str]) -> set[str]:
+    """Print one row per detector and group or kind of contact; false alarms belong to no kind."""
     from cdtool.report.few_contacts import latency_columns
 
-    shown = latency_columns(kinds)
-    columns = [("group/kind", "left"), ("detector", "left")]
-    columns += [(name, "right") for name in (*(_HEADINGS[name] for name in shown), "n", "missed", "n.a.")]
-    typer.echo()
-    return _detector_table(columns, [_row(item, shown)[:-2] for item in kinds], short)
+    latencies = latency_columns(items)
+    bounded = any(item.few and not math.isnan(item.median.low) for item in items)
+    headings = _HEADINGS | ({"median": "median ms\n(95 %)"} if bounded else {})
+    columns = [(heading, "left"), ("detector", "left")]
+    columns += [(name, "right") for name in (*(headings[name] for name in latencies), *_COUNTED)]
+    return detector_table(columns, [_row(item, latencies) for item in items], short)
 
 
 def _show_conditions(evaluated: Evaluated, short: Mapping[str, str]) -> set[str]:
@@ -121,7 +99,7 @@ def _show_conditions(evaluated: Evaluated, short: Mapping[str, str]) -> set[str]
     names = [row[0].text for row in found.rows]
     ordered = [[row[1], name, *row[2:]] for row, name in zip(rows, names, strict=True)]
     typer.echo()
-    used = _detector_table([columns[1], columns[0], *columns[2:]], ordered, short)
+    used = detector_table([columns[1], columns[0], *columns[2:]], ordered, short)
     say(
         "changed conditions, in brackets the unchanged machine; alarming: impact-free operations with a false alarm; "
         "ms: mean latency, or the median where fewer than ten contacts were detected; n.a.: not assessable"
@@ -174,88 +152,67 @@ def finish(evaluated: Evaluated) -> None:
     leave(results.skipped, results.findings, [Fact[name.upper()] for name in results.conclusion.facts])
 
 
-def _row(item: Summary, shown: Sequence[LatencyColumn]) -> tuple[Any, ...]:
+def _row(item: Summary, columns: Sequence[LatencyColumn]) -> tuple[Any, ...]:
     if not item.contacts:
-        return item.group, item.detector, *(("-",) * (len(shown) + 3)), _false_alarms(item), item.operations
+        return shown(item.group), item.detector, *(("-",) * (len(columns) + 1)), "", _false_alarms(item)
     return (
-        item.group,
+        shown(item.group),
         item.detector,
-        *(_latency(item, column) for column in shown),
-        item.detected,
-        _counted(item.missed, "bad") if item.assessable else "-",
-        _counted(item.not_assessable, "unknown"),
+        *(_latency(item, column) for column in columns),
+        _counted(item.missed, f"of {item.assessable}", "bad") if item.assessable else "-",
+        _counted(item.not_assessable, f"of {item.contacts}", "unknown") if item.not_assessable else "",
         _false_alarms(item),
-        item.operations,
     )
 
 
 def _latency(item: Summary, column: LatencyColumn) -> str:
-    """Return a latency with its interval; quantiles have theirs only if they replace the mean."""
-    from cdtool.report.few_contacts import latency_interval
+    """Return a latency as the report shows it; quantiles have their interval only if they replace the mean."""
+    from cdtool.report.tables.results import latency_cell
 
-    if column == "range":
-        return _range(item)
-    figure = latency_interval(item, column)
-    if figure is None:
+    cell = latency_cell(column, item)
+    if cell.text == NOTHING:
         return "-"
-    if column == "std":
-        return number(figure.value, 2)
-    bounded = column == "mean" or (column == "median" and item.few)
-    return interval(figure) if bounded else quantile(figure.value)
-
-
-def _range(item: Summary) -> str:
-    """Return the shortest and longest latency; a missed contact counts as later than all."""
-    ends = (quantile(item.min_ms), quantile(item.max_ms))
-    return ends[0] if ends[0] == ends[1] else " to ".join(ends)
+    bounded = column == "mean" or (column == "median" and item.few and not math.isnan(item.median.low))
+    return cell.line if bounded else cell.text
 
 
 def _what(item: CalibrationResult) -> str:
     return "false alarms in" if item.budget.endswith("h") else "alarming of"
 
 
-def _false_alarms(item: Summary) -> Toned | int | str:
-    """Return the false alarms, or a dash if the detector could not assess anything."""
-    return _counted(item.false_alarms, "bad") if item.watched else "-"
+def _false_alarms(item: Summary) -> Toned | str:
+    """Return the false alarms, or a dash if the detector could not assess anything; nothing for a kind of contact."""
+    if not item.operations:
+        return ""
+    return _counted(item.false_alarms, f"in {item.judged_operations}", "bad") if item.watched else "-"
 
 
-def _counted(count: int, tone: str) -> Toned | int:
-    """Return a number that has a tone unless it is 0."""
-    return Toned(count, tone) if count else 0
+def _counted(count: int, among: str, tone: str) -> Toned:
+    """Return a number with what it is counted among; it has a tone unless it is 0."""
+    return Toned(f"{count} {among}", tone if count else "")
 
 
-def interval(item: Interval) -> str:
-    """Return a value with its interval, as 38.2 (36.0 to 41.1)."""
-    if not math.isfinite(item.value):
-        return quantile(item.value)
-    if math.isnan(item.low) or math.isnan(item.high):
-        return number(item.value)
-    above = "..." if item.high == math.inf else number(item.high)
-    return f"{number(item.value)} ({number(item.low)} to {above})"
+def _show_statistics(summaries: Sequence[Summary]) -> None:
+    """Print what no missed contact and no false alarm can mean at most, then how far the latencies can be trusted."""
+    from cdtool.report.few_contacts import explained
+
+    missed, alarms = defaultdict(list), defaultdict(list)
+    for item in summaries:
+        if item.assessable and not item.missed and not math.isnan(item.missed_at_most):
+            missed[item.assessable].append(item.missed_at_most)
+        if not item.contacts and item.watched and not item.false_alarms:
+            alarms[item.judged_operations].append(item.at_most_per_operation)
+    parts = [f"0 of {of} missed: up to {percent(max(missed[of]))}" for of in _ends(missed)]
+    parts += [f"0 false alarms in {of}: up to {number(max(alarms[of]))} per operation" for of in _ends(alarms)]
+    if parts:
+        say(f"{'; '.join(parts)} (95 %)")
+    say(explained(summaries).split(". ")[0])
 
 
-def quantile(value: float) -> str:
-    """Return a quantile; infinite if too many contacts were missed to reach it."""
-    return "not reached" if value == math.inf else number(value)
-
-
-def _show_bounds(evaluated: Evaluated) -> None:
-    """Print upper bounds where a group shows no missed contact or no false alarm."""
-    for group in evaluated.results.groups:
-        items = [item for item in evaluated.summaries if item.group == group]
-        clean = [item for item in items if item.contacts and not item.missed and not math.isnan(item.missed_at_most)]
-        if clean:
-            least = max(item.missed_at_most for item in clean)
-            say(f"{group}: 0 missed ({_named(clean, items)}) means at most {100.0 * least:.2g} % (95 %)")
-        quiet = [item for item in items if not item.contacts and not item.false_alarms and item.watched]
-        if quiet:
-            rate = max(item.at_most_per_operation for item in quiet)
-            who = _named(quiet, items)
-            say(f"{group}: 0 false alarms ({who}) means at most {rate:.2g} per operation (95 %)")
-
-
-def _named(some: Sequence[Summary], of: Sequence[Summary]) -> str:
-    return "all detectors" if len(some) == len(of) else ", ".join(item.detector for item in some)
+def _ends(counts: Iterable[int]) -> list[int]:
+    """Return the smallest and the largest number, once if they are equal."""
+    numbers = sorted(counts)
+    return list(dict.fromkeys((*numbers[:1], *numbers[-1:])))
 
 
 def _show_forces(results: Any) -> None:

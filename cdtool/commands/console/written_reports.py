@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from cdtool.commands.console.console import plain, print_line, progress
+from cdtool.commands.console.console import print_line, print_skipped, print_written, progress
 from cdtool.commands.console.summary_table import show_conclusion, show_table
 
 if TYPE_CHECKING:
@@ -18,22 +18,22 @@ if TYPE_CHECKING:
 
 def write_reports(
     report: Report, targets: Sequence[Path], *, force: bool, quiet: bool, inputs: Sequence[Path] = ()
-) -> list[Path]:
-    """Write all reports and return what to show; a bar until the last figure is written. Raises CdtoolError."""
+) -> None:
+    """Write all reports; a bar until the last figure is written. Raises CdtoolError."""
     from cdtool.report.outputs import write_outputs
 
     with progress("writing reports", pulses=True, quiet=quiet or not targets) as advance:
-        return write_outputs(report, targets, force=force, inputs=inputs, progress=advance)
+        write_outputs(report, targets, force=force, inputs=inputs, progress=advance)
 
 
-def show_results(evaluated: Evaluated, written: Sequence[Path], *, quiet: bool, more: Sequence[str] = ()) -> None:
-    """Print the conclusion, and unless `quiet` the tables, `more` lines, and what was written."""
+def show_results(evaluated: Evaluated, targets: Sequence[Path], *, quiet: bool, more: Sequence[str] = ()) -> None:
+    """Print the conclusion and what was left out, and unless `quiet` the tables, `more` lines, and the files."""
     show_conclusion(evaluated)
+    print_skipped(evaluated.results.skipped, evaluated.results.findings)
     if quiet:
         return
     typer.echo()
     show_table(evaluated)
     for line in more:
         print_line(line)
-    for path in written:
-        print_line(f"written: {plain(path)}")
+    print_written(targets)

@@ -16,12 +16,11 @@ from cdtool.base.exit_status import Fact
 from cdtool.base.log_names import log_stem
 from cdtool.commands.console.console import (
     leave,
-    plain,
     print_error,
     print_json,
-    print_line,
     print_not_assessable,
     print_skipped,
+    print_written,
     progress,
 )
 from cdtool.commands.console.options import (
@@ -171,15 +170,15 @@ class _DetectedLogs:
         absent = [
             RecordingFinding.of(str(log), item) for log, found in self.done for item in absent_truth(found.recording)
         ]
-        print_skipped(self.skipped, [*learned, *self.findings, *absent])
+        detected = [found for _, found in self.done]
         if as_json:
             print_json(as_rows(self.done, self.forces))
-        elif quiet:
-            show_conclusion([found for _, found in self.done])
         else:
-            show_detected([found for _, found in self.done], self.forces)
-            for plot in self.plotted:
-                print_line(f"plot written to {plain(plot)}")
+            show_conclusion(detected)
+        print_skipped(self.skipped, [*learned, *self.findings, *absent])
+        if not (as_json or quiet):
+            show_detected(detected, self.forces)
+            print_written(self.plotted)
         leave(self.skipped, self.findings, print_not_assessable((str(log), found) for log, found in self.done))
 
 

@@ -17,7 +17,8 @@ from cdtool.base.plain_text import counted
 from cdtool.commands.detecting.detection import Detected
 from cdtool.detectors.detection import Alarm
 from cdtool.recordings.recording import Contact
-from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label, write
+from cdtool.report.number_text import number
+from cdtool.report.plots.figures import drawing, label, log_label, new_figure, save, unit_label, write
 from cdtool.report.plots.panels import (
     Legend,
     count_from,
@@ -29,6 +30,7 @@ from cdtool.report.plots.panels import (
     frame_signal,
 )
 from cdtool.report.plots.style import look_of
+from cdtool.results.results import ContactResult
 from cdtool.results.traces.trace import Span, StatisticCurve
 from cdtool.truth.matching import Match
 
@@ -98,10 +100,10 @@ def _figure(found: Detected) -> Figure:
         _finish_zoom(grid, event, zoom)
     _name_event(list(grid[:, -1]), joints, event)
     if event.contact and event.alarm:
-        late = next(item.latency for item in matches if item.alarm is event.alarm)
-        _write_latency(grid[len(joints), -1], event, late)
+        late = next(row for rows in found.contact_rows for row in rows if row.outcome == "detected")
+        _write_latency(grid[len(joints), -1], event, number(late.latency_ms, error=late.resolution_ms))
     figure.suptitle(
-        f"{label(recording.name, 60)}  ·  {label(detector)}\n{_outcome_words(found, alarming, joints)}",
+        f"{log_label(recording.name)}  ·  {label(detector)}\n{_outcome_words(found, alarming, joints)}",
         fontsize=10,
         x=0.01,
         ha="left",
@@ -169,7 +171,7 @@ def _write_above(axes: Axes, time: float, text: str, side: str, *, bold: bool = 
     write(axes, text, (time, 1.0), (0, 3), frame, ha=side, va="bottom", fontsize=9, fontweight=weight)
 
 
-def _write_latency(axes: Axes, event: _Event, latency: float) -> None:
+def _write_latency(axes: Axes, event: _Event, latency_ms: str) -> None:
     if event.contact is None or event.alarm is None:
         return
     axes.annotate(
@@ -179,7 +181,7 @@ def _write_latency(axes: Axes, event: _Event, latency: float) -> None:
         arrowprops={"arrowstyle": "->", "shrinkA": 0, "shrinkB": 0, "linewidth": 0.9},
     )
     axes.annotate(
-        f"latency {1e3 * latency:.0f} ms ",
+        f"latency {latency_ms} ms ",
         (min(event.contact.start, event.alarm.time), 0.5),
         ha="right",
         va="center",
@@ -229,8 +231,8 @@ def _outcome_words(found: Detected, alarming: list[int], joints: list[int]) -> s
         The columns of the joints that alarm, and of those that are drawn.
 
     """
-    matches = [item for matching in found.matchings for item in matching.matches]
-    words = _words_of_contacts(matches) + _words_of_alarms(found, bool(matches))
+    contacts = [row for rows in found.contact_rows for row in rows]
+    words = _words_of_contacts(contacts) + _words_of_alarms(found, bool(contacts))
     not_assessable = _words_of_not_assessable(found)
     if not_assessable:
         words = [word for word in words if word not in ("no alarm", "not assessable")]
@@ -238,14 +240,15 @@ def _outcome_words(found: Detected, alarming: list[int], joints: list[int]) -> s
     return "  ·  ".join([*words, *not_assessable, *operations, *_words_of_joints(found, alarming, joints)])
 
 
-def _words_of_contacts(matches: list[Match]) -> list[str]:
-    late = [1e3 * item.latency for item in matches if item.outcome == "detected"]
-    if not matches:
+def _words_of_contacts(contacts: Sequence[ContactResult]) -> list[str]:
+    detected = sorted((row.latency_ms, row.resolution_ms) for row in contacts if row.latency_ms is not None)
+    late = [number(latency, error=resolution) for latency, resolution in detected]
+    if not contacts:
         return []
-    if len(matches) == 1:
-        return [f"detected after {late[0]:.0f} ms" if late else matches[0].outcome.replace("_", " ")]
-    spread = f" after {min(late):.0f} to {max(late):.0f} ms" if late else ""
-    return [f"{len(late)} of {counted(len(matches), 'contact')} detected{spread}"]
+    if len(contacts) == 1:
+        return [f"detected after {late[0]} ms" if late else contacts[0].outcome.replace("_", " ")]
+    spread = f" after {late[0]} to {late[-1]} ms" if late else ""
+    return [f"{len(late)} of {counted(len(contacts), 'contact')} detected{spread}"]
 
 
 def _words_of_alarms(found: Detected, has_contacts: bool) -> list[str]:

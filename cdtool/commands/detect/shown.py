@@ -13,7 +13,6 @@ from cdtool.base.plain_text import LISTED, NAMED, counted
 from cdtool.commands.console.colour import Toned
 from cdtool.commands.console.console import number, plain, print_line, say, table
 from cdtool.commands.console.contact_rows import contact_as_json
-from cdtool.commands.console.truth_shown import NEGATIVE
 
 if TYPE_CHECKING:
     from cdtool.alarms.pipeline import Detection
@@ -23,6 +22,8 @@ if TYPE_CHECKING:
     from cdtool.results.results import ContactResult
     from cdtool.truth.matching import Matching
 
+# Shown next to a negative latency.
+_NEGATIVE = "alarm before the onset, within its uncertainty: counted as 0"
 # `found_by` of a contact whose onset was found by the rule for the load cell.
 _CELL = "load cell"
 # The colours of outcomes.
@@ -31,7 +32,11 @@ _TONES = {"missed": "bad", "not_assessable": "unknown"}
 
 def show_detected(done: Sequence[Detected], forces: Mapping[str, ForceSummary]) -> None:
     """Print the table of all logs, then sections that are not assessable, signal notes and estimated forces."""
-    rows = [(found, *pair) for found in done for pair in zip(found.detections, found.matchings, strict=True)]
+    rows = [
+        (found, *of_operation)
+        for found in done
+        for of_operation in zip(found.detections, found.matchings, found.contact_rows, strict=True)
+    ]
     detections = [detection for found in done for detection in found.detections]
     _show(rows, done[0].threshold)
     _show_not_assessable(detections)
@@ -44,18 +49,15 @@ def show_detected(done: Sequence[Detected], forces: Mapping[str, ForceSummary]) 
 
 def show_conclusion(done: Sequence[Detected]) -> None:
     """Print in one line how many operations have which verdict, and how many contacts which outcome."""
-    detections = [detection for found in done for detection in found.detections]
-    matches = [item for found in done for matching in found.matchings for item in matching.matches]
+    verdicts = [detection.verdict.outcome for found in done for detection in found.detections]
+    contacts = [item.outcome for found in done for matching in found.matchings for item in matching.matches]
     parts = [
         ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in sorted(Counter(names).items()))
-        for names in (
-            [detection.verdict.outcome for detection in detections],
-            [item.outcome for item in matches],
-        )
+        for names in (verdicts, contacts)
     ]
-    words = f"{counted(len(detections), 'operation')}: {parts[0]}" if detections else "no operation"
-    words += f"; {counted(len(matches), 'contact')}: {parts[1]}" if matches else "; no contact"
-    say(words, tone="bad" if any(item.outcome == "missed" for item in matches) else "")
+    words = f"{counted(len(verdicts), 'operation')}: {parts[0]}" if verdicts else "no operation"
+    words += f"; {counted(len(contacts), 'contact')}: {parts[1]}" if contacts else "; no contact"
+    say(words, tone=next((tone for outcome, tone in _TONES.items() if outcome in (*contacts, *verdicts)), ""))
 
 
 def as_rows(done: Sequence[tuple[Path, Detected]], forces: Mapping[str, ForceSummary]) -> list[dict[str, Any]]:
@@ -67,7 +69,7 @@ def as_rows(done: Sequence[tuple[Path, Detected]], forces: Mapping[str, ForceSum
     ]
 
 
-def _show(rows: list[tuple[Detected, Detection, Matching]], threshold: str) -> None:
+def _show(rows: Sequence[tuple[Detected, Detection, Matching, Sequence[ContactResult]]], threshold: str) -> None:
     """Print a row per alarm, per contact without an alarm, and per operation without either."""
     cells = [cell for row in rows for cell in _rows_of(*row)]
     first = rows[0][1]
@@ -76,23 +78,29 @@ def _show(rows: list[tuple[Detected, Detection, Matching]], threshold: str) -> N
     columns += [(f"signal\n{unit}", "right"), ("limit", "right"), ("latency\nms", "right"), ("why", "left")]
     print_line(f"{first.detector}: {plain(threshold)}")
     table(columns, cells)
-    rules = {found.onset for found, _, matching in rows for item in matching.matches if item.contact.found_by == _CELL}
+    rules = {
+        found.onset for found, _, matching, _ in rows for item in matching.matches if item.contact.found_by == _CELL
+    }
     for rule in sorted(rules):
         say(f"latency from contact onset to alarm, debounce included; onset: {rule}")
 
 
-def _rows_of(found: Detected, detection: Detection, matching: Matching) -> list[tuple[object, ...]]:
+def _rows_of(
+    found: Detected, detection: Detection, matching: Matching, contacts: Sequence[ContactResult]
+) -> list[tuple[object, ...]]:
     from cdtool.commands.detecting.detection import NO_CONTACT
+    from cdtool.report.number_text import number as rounded
 
     name = detection.operation.name
     latency = {item.alarm: item for item in matching.matches if item.alarm}
+    resolution = {item.alarm: row.resolution_ms for item, row in zip(matching.matches, contacts, strict=True)}
     rows: list[tuple[object, ...]] = []
     for alarm in sorted({*detection.verdict.alarms, *latency}, key=lambda alarm: (alarm.time, alarm.column)):
-        late = number(1e3 * latency[alarm].latency, 3) if alarm in latency else "-"
+        late = rounded(1e3 * latency[alarm].latency, error=resolution[alarm]) if alarm in latency else "-"
         figures = (number(alarm.statistic, 4), number(alarm.limit, 4), late)
         why = "" if alarm in latency else _why_no_latency(found, alarm)
         if alarm in latency and latency[alarm].clipped:
-            why = NEGATIVE
+            why = _NEGATIVE
         if alarm in latency and latency[alarm].contact.hole:
             later = 1e3 * latency[alarm].contact.uncertainty
             missing = f"up to {later:.0f} ms later: load-cell samples missing at the onset"

@@ -15,11 +15,12 @@ from cdtool.base.plain_text import LISTED, counted
 from cdtool.commands.console.console import (
     leave,
     number,
-    plain,
     print_json,
     print_line,
     print_not_assessable,
     print_skipped,
+    print_written,
+    progress,
     say,
     table,
 )
@@ -70,14 +71,15 @@ def explain(
     from cdtool.commands.judging.settings_table import given_settings
 
     drawn = plot if plot is None or plot.is_dir() else figure_name(plot, force=force)
-    ready = prepared(
-        machine,
-        benchmark=benchmark,
-        signature=signature,
-        detector=detectors and one_detector(detectors),
-        settings=given_settings(settings or ()),
-    )
-    explained = explain_log(log, ready)
+    with progress("explaining", pulses=True):
+        ready = prepared(
+            machine,
+            benchmark=benchmark,
+            signature=signature,
+            detector=detectors and one_detector(detectors),
+            settings=given_settings(settings or ()),
+        )
+        explained = explain_log(log, ready)
     runs = [(run.found.recording.source if ready.has_runs else str(log), run) for run in explained.runs]
     skipped = [*ready.skipped, *explained.skipped]
     skipped += [item for run in explained.runs for item in run.found.not_scored]
@@ -91,9 +93,8 @@ def explain(
     else:
         for _, run in runs:
             _show_explained(run)
-    for path in _draw(explained.runs, drawn, log_stem(log), force=force):
-        if not as_json:
-            print_line(f"plot written to {plain(path)}")
+    plots = _draw(explained.runs, drawn, log_stem(log), force=force)
+    print_written(() if as_json else plots)
     leave(skipped, findings, print_not_assessable([(name, run.found) for name, run in runs]))
 
 

@@ -14,7 +14,8 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.plain_text import counted
 from cdtool.recordings.recording import Recording
 from cdtool.report.explanation_words import words
-from cdtool.report.plots.figures import drawing, label, new_figure, save, unit_label, write
+from cdtool.report.number_text import number
+from cdtool.report.plots.figures import drawing, label, log_label, new_figure, save, unit_label, write
 from cdtool.report.plots.panels import (
     PIXELS,
     Legend,
@@ -25,7 +26,7 @@ from cdtool.report.plots.panels import (
     draw_signal,
     frame_signal,
 )
-from cdtool.report.plots.style import BAND, look_of
+from cdtool.report.plots.style import BAND, LIMIT_LINE, look_of
 from cdtool.results.explanation.departure import Departure
 from cdtool.results.explanation.explanation import Explanation
 from cdtool.results.explanation.margin import joint_margins
@@ -76,7 +77,7 @@ def _figure(detection: Detection, item: Explanation) -> Figure:
     panels[-1].set_xlabel(f"time from {event} [ms]")
     count_from(panels[-1], item.zero, next((x for x in _STEPS if (span[1] - span[0]) / x <= 12), _STEPS[-1]))
     figure.align_ylabels()
-    heading = f"{label(item.operation, 60)}  ·  {label(item.detector)}  ·  {label(item.joint)}"
+    heading = f"{log_label(item.operation)}  ·  {label(item.detector)}  ·  {label(item.joint)}"
     figure.suptitle(f"{heading}\n{fill(label(words(item)[0], 200), 110)}", fontsize=10, x=0.01, ha="left")
     figure.legend(handles=[*legend.handles(), *_more_handles(item, channels)], loc="outside lower left", ncols=4)
     return figure
@@ -115,8 +116,9 @@ def _draw_channel(axes: Axes, recording: Recording, departure: Departure, item: 
         return
     axes.axvline(departure.time, color=colour, linewidth=0.9, linestyle=":")
     axes.plot([departure.time], [1.0], marker="v", color=colour, transform=axes.get_xaxis_transform(), clip_on=False)
-    after = f"{1e3 * (departure.time - item.zero):+.0f} ms".replace("-", "−")
-    _write(axes, after, (departure.time, 1.0), (6, -1), "left")
+    after = number(1e3 * abs(departure.time - item.zero), error=1e3 * float(np.median(np.diff(series.time))))
+    sign = "−" if departure.time < item.zero else "+"
+    _write(axes, f"{sign}{after} ms", (departure.time, 1.0), (6, -1), "left")
 
 
 def _draw_statistic(axes: Axes, detection: Detection, item: Explanation, span: Span, legend: Legend) -> None:
@@ -131,7 +133,7 @@ def _draw_margin(axes: Axes, detection: Detection, item: Explanation, span: Span
     inside = (margin.time >= span[0]) & (margin.time <= span[1])
     time, value = margin.time[inside], margin.margin[inside]
     _name(axes, f"margin to limit\n[{unit_label(item.unit)}]")
-    axes.axhline(0.0, color="0.25", linewidth=0.9, linestyle=(0, (4, 2)))
+    axes.axhline(0.0, **LIMIT_LINE)
     if not np.isfinite(value).any():
         return
     colour = look_of(item.detector).colour
@@ -147,7 +149,7 @@ def _draw_margin(axes: Axes, detection: Detection, item: Explanation, span: Span
     for nearest in [found.nearest for found in item.approaches[:1]]:
         depth = float(np.clip(nearest.margin, low, high))
         axes.plot([nearest.time], [depth], marker="o", color=colour, clip_on=False)
-        words = f"nearest, {1e3 * (nearest.time - item.zero):.0f} ms"
+        words = f"nearest, {number(1e3 * (nearest.time - item.zero), error=1e3 * float(np.median(np.diff(time))))} ms"
         axes.annotate(words, (nearest.time, depth), (8, 0), textcoords="offset points", va="center", fontsize=8)
 
 

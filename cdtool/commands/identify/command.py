@@ -20,6 +20,7 @@ from cdtool.commands.console.console import (
     print_json,
     print_line,
     print_skipped,
+    print_written,
     progress,
     say,
     table,
@@ -141,13 +142,13 @@ def _identify_machine(
 def _show(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Path], *, quiet: bool) -> None:
     from cdtool.commands.identify.words import words_of_robot
 
+    runs = counted(len(done.runs), "impact-free run")
+    print_line(f"{plain(done.machine)}: identified from {runs}")
     for joint in done.joints:
         validation = joint.evidence.cross_validation if joint.evidence else None
         # The error on unseen runs is three times the difference of equal strokes: something is not in the model.
         if validation and (left := validation.left_over) > 3.0:
             print_line(f"{plain(joint.joint)}: the model leaves over {number(left, 2)} {_DOUBT}")
-    runs = counted(len(done.runs), "impact-free run")
-    print_line(f"{plain(done.machine)}: identified from {runs}")
     if done.changes and not quiet:
         _show_changes(done)
     if done.robot is not None and not quiet:
@@ -172,14 +173,7 @@ def _show_joint(joint: JointIdentification, name: str) -> None:
 
 
 def _show_files(done: IdentifiedMachine, written: Sequence[Path], targets: Sequence[Path]) -> None:
-    kinds = {
-        ".toml": "machine file",
-        ".urdf": "URDF with the identified inertias",
-        ".html": "report",
-        ".json": "values",
-    }
-    for path in written:
-        print_line(f"written: {plain(path)} ({kinds[path.suffix.lower()]})")
+    print_written(written)
     for target in targets:
         if target not in written:
             print_line(f"not written: {plain(target)}: nothing new predicts unseen runs better")

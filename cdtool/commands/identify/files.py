@@ -11,7 +11,7 @@ from cdtool.base.files.strict_json import strict_json
 from cdtool.base.files.writing import write_texts
 from cdtool.base.plain_text import plain
 from cdtool.commands.identify.identifying import IdentifiedMachine
-from cdtool.report.output_names import check_output_names
+from cdtool.report.outputs import check_output_names
 
 MACHINE, PAGE, JSON = ".toml", ".html", ".json"
 _KINDS: Mapping[str, Kind] = {

@@ -12,9 +12,9 @@ from cdtool.base.plain_text import counted
 from cdtool.commands.identify.axis.speed_controller import ControllerComparison
 from cdtool.commands.identify.axis.two_mass import StartComparison
 from cdtool.commands.identify.evidence import CrossValidation, ForceEvidence, FrictionCurve
-from cdtool.detectors.look import BLUE, RED
+from cdtool.detectors.look import BLUE, RUST
 from cdtool.report.number_text import number
-from cdtool.report.plots.figures import drawing, label, new_figure
+from cdtool.report.plots.figures import drawing, log_label, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 #: Inches, as the other plots of a page.
 _WIDTH = 9.0
-_MEASURED, _UNDER, _MODEL, _RESIDUAL, _BAND = "0.35", "0.6", BLUE, RED, "0.85"
+_MEASURED, _UNDER, _MODEL, _RESIDUAL, _BAND = "0.35", "0.6", BLUE, RUST, "0.85"
 
 
 def draw_unseen_run(validation: CrossValidation, unit: str) -> Figure:
@@ -42,7 +42,7 @@ def draw_unseen_run(validation: CrossValidation, unit: str) -> Figure:
         _compare(
             panels, time, (measured, predicted), f"force [{unit}]", (floor, "between equal motions (± 1 st. dev.)")
         )
-        title = f"{label(unseen.run)}, left out of the fit ({what}): {number(unseen.error)} {unit} RMS"
+        title = f"{log_label(unseen.run)}, left out of the fit ({what}): {number(unseen.error)} {unit} RMS"
         panels[0].set_title(title, loc="left")
         for panel in panels:
             panel.legend(loc="upper right", ncols=2)
@@ -75,7 +75,8 @@ def draw_friction(shown: ForceEvidence, units: tuple[str, str, str]) -> Figure:
         _legend_once(left)
         names = {1: "forward", -1: "backward"}
         for direction, item in shown.position_curves.items():
-            _bars(right, item, _RESIDUAL if direction > 0 else _MODEL, names[direction], line=True)
+            look = (_RESIDUAL, names[direction], "o-") if direction > 0 else (_MODEL, names[direction], "s--")
+            _bars(right, item, *look[:2], line=look[2])
         right.axhline(0.0, color="0.3", linewidth=0.6)
         right.set_xlabel(f"position [{travel}]")
         right.set_ylabel(f"residual [{force}]")
@@ -139,7 +140,7 @@ def _compare(
     """Draw measured and modelled lines (n,) above, and below them their difference over a band of what is usual."""
     (above, below), (measured, modelled), (usual, name) = panels, lines, band
     above.plot(time, measured, color=_UNDER, linewidth=2.5, label="measured")
-    above.plot(time, modelled, color=_MODEL, linewidth=1.1, label="model")
+    above.plot(time, modelled, color=_MODEL, linestyle=(0, (4, 1.5)), linewidth=1.3, label="model")
     above.set_ylabel(axis)
     if usual is not None:
         below.fill_between(time, -usual, usual, color=_BAND, linewidth=0, label=name)
@@ -162,14 +163,14 @@ def _gaps(time: FloatArray, values: FloatArray) -> FloatArray:
     return np.where(steps > 5.0 * float(np.median(steps[1:])), np.nan, values)
 
 
-def _bars(axes: Axes, curve: FrictionCurve, colour: str, name: str, *, line: bool = False) -> None:
+def _bars(axes: Axes, curve: FrictionCurve, colour: str, name: str, *, line: str = "") -> None:
     """Draw a curve with two standard errors."""
     errors = 2.0 * np.nan_to_num(curve.standard_error)
     axes.errorbar(
         curve.abscissa,
         curve.mean,
         yerr=errors,
-        fmt="o-" if line else "o",
+        fmt=line or "o",
         color=colour,
         markersize=2.5 if line else 4,
         linewidth=0.8,

@@ -15,6 +15,7 @@ from cdtool.commands.console.console import (
     print_error,
     print_json,
     print_line,
+    print_next,
     table,
     with_findings,
 )
@@ -65,6 +66,8 @@ def info(
             typer.echo(f"\nAll {len(done)} logs, if their clocks are the same:\n")
             for finding in common:
                 print_line(f"{finding.severity}: {plain(str(finding))}")
+        if done and machine is None:
+            print_next("cdtool", "init", done[0].source)
     leave_with((finding for item in done for finding in item.findings), facts if done else [Fact.NOTHING_USABLE])
 
 
@@ -96,7 +99,3 @@ def _show(item: Info) -> None:
             print_line(f"{severity}: {plain(f'{name}: {text}' if name else text)}")
     if not item.findings:
         print_line("no warnings")
-    if item.dialect:
-        typer.echo("\nTable format, to be pasted into a machine file:\n")
-        for line in item.dialect.splitlines():
-            typer.echo(plain(line))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,14 +9,17 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdtool.base.errors import UsageError
+from cdtool.base.plain_text import counted
 from cdtool.commands.console.console import (
     leave,
     leave_with,
     plain,
     print_json,
     print_line,
+    print_next,
     print_skipped,
     progress,
+    say,
     with_findings,
 )
 from cdtool.commands.console.options import (
@@ -95,10 +97,8 @@ def init(
         if as_json:
             print_json(with_findings(drafted))
         else:
-            typer.echo(drafted.text)
-            first = "Check each line marked CHECK" if drafted.channels else "Add its channels"
-            print_line(f"{plain(drafted.path)} written: a draft based on guesses. {first}, then run")
-            typer.echo(f"  cdtool info {_quoted(logs[0])} --machine {_quoted(drafted.path)}")
+            _show_draft(drafted.path, drafted.text)
+            print_next("cdtool", "info", logs[0], "--machine", drafted.path)
         _warn(drafted)
         leave_with(drafted.findings)
         return
@@ -119,23 +119,40 @@ def init(
 def _show(study: DraftedStudy, logs: list[Path], output: Path) -> None:
     from cdtool.commands.init.benchmark_draft import patterns
 
-    typer.echo(study.text)
-    names = [*([study.machine_path] if study.machine else []), study.path, *study.beside]
-    print_line(
-        f"{', '.join(map(plain, names))} written: drafts based on guesses. Check each line marked CHECK, then run"
-    )
-    typer.echo(f"  cdtool info {_quoted(logs[0])} --machine {_quoted(study.machine_path)}")
+    if study.machine:
+        _show_draft(study.machine.path, study.machine.text)
+    _show_draft(study.path, study.text)
     for name in study.kept:
         print_line(f"{plain(name)} kept as it is: delete it for an empty one")
+    print_next("cdtool", "info", logs[0], "--machine", study.machine_path)
     if study.beside:
-        print_line(f"fill in {', '.join(map(plain, study.beside))}, or map a load cell and draft the benchmark again:")
-        some = " ".join("*".join(part and _quoted(part) for part in item.split("*")) for item in patterns(logs, Path()))
-        typer.echo(f"  cdtool init {some} --machine {_quoted(study.machine_path)} -o {_quoted(output)} --force")
+        print_line(f"then: fill in {', '.join(map(plain, study.beside))}, or map a load cell and draft again:")
+        again = ("--machine", study.machine_path, "-o", output, "--force")
+        print_next("cdtool", "init", *patterns(logs, Path()), *again, first="then")
     if study.has_detectors:
-        typer.echo(f"  cdtool benchmark {_quoted(study.path)} -o {_quoted(output / 'report.html')}")
+        print_next("cdtool", "benchmark", study.path, "-o", output / "report.html", first="then")
     if not study.beside and not study.kept:
-        print_line("for a test protocol of the contact forces:")
-        typer.echo(f"  cdtool protocol init {_quoted(study.path)} -o {_quoted(output / 'protocol.toml')}")
+        print_next("cdtool", "protocol", "init", study.path, "-o", output / "protocol.toml", first="then")
+
+
+def _show_draft(path: str, text: str) -> None:
+    """Print how many lines of a draft are to be checked, and its lines without the reasons that are in its comments."""
+    lines: list[str] = []
+    marked = False
+    for line in text.splitlines():
+        marked = marked or "CHECK:" in line
+        if line.startswith("#"):
+            continue
+        code = line.partition("  # ")[0]
+        if code or (lines and lines[-1]):
+            lines.append(f"{code}  # CHECK" if marked and code else code)
+        marked = False
+    marks = counted(sum(line.endswith("# CHECK") for line in lines), "line")
+    say(f"{path}: a draft based on guesses, {marks} to be checked; its comments have the reasons")
+    typer.echo()
+    for line in lines:
+        print_line(f"  {plain(line)}" if line else "")
+    typer.echo()
 
 
 def _warn(drafted: Drafted) -> None:
@@ -149,8 +166,3 @@ def _warn(drafted: Drafted) -> None:
     for finding in drafted.findings:
         if finding.severity == "loss" or finding.kind == "steady_header":
             print_line(f"{finding.severity}: {plain(finding)}", err=True)
-
-
-def _quoted(path: object) -> str:
-    """Return a path quoted for a shell."""
-    return shlex.quote(plain(path))

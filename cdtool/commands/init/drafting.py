@@ -116,7 +116,7 @@ def init(
 
 
 def _written(logs: Sequence[Path], target: Path, csv: Mapping[str, Any], urdf: str | Path | None) -> Drafted:
-    draft = _drafted(logs[0], csv)
+    draft = _drafted(logs[0], csv, target.absolute().parent.name)
     draft = draft if urdf is None else _of_robot(draft, location(urdf).absolute())
     drafted = _settled(logs, draft)
     # While guesses are settled the draft is elsewhere, and names the URDF by its whole path.
@@ -324,7 +324,7 @@ def _with_words(path: Path, found: Format, csv: Mapping[str, Any]) -> tuple[Sour
     return source, words
 
 
-def _drafted(log: Path, csv: Mapping[str, Any]) -> Draft:
+def _drafted(log: Path, csv: Mapping[str, Any], folder: str) -> Draft:
     path = log_parts(log)[0]
     found = choose_format(path)
     source, words = _with_words(path, found, csv)
@@ -360,9 +360,8 @@ def _drafted(log: Path, csv: Mapping[str, Any]) -> Draft:
     low_pass = propose_low_pass(position.stream, time.in_seconds) if position is not None and derived else None
     joints, why = _joints(path, channels, topics)
     left = unmapped_columns(channels)
-    return Draft(
-        log_stem(log), log.name, side, joints, why, time, channels, topics, evidence, left, low_pass, csv, words
-    )
+    name = folder or log_stem(log)  # the files of a machine are in a folder of its own
+    return Draft(name, log.name, side, joints, why, time, channels, topics, evidence, left, low_pass, csv, words)
 
 
 def _of_robot(draft: Draft, urdf: Path) -> Draft:

@@ -9,7 +9,16 @@ import typer
 
 from cdtool.base.errors import UsageError
 from cdtool.base.plain_text import counted
-from cdtool.commands.console.console import leave, plain, print_json, print_line, print_skipped, progress
+from cdtool.commands.console.console import (
+    leave,
+    plain,
+    print_json,
+    print_line,
+    print_next,
+    print_skipped,
+    print_written,
+    progress,
+)
 from cdtool.commands.console.options import (
     ClusterOption,
     ForceOption,
@@ -72,25 +81,24 @@ def inject(
     if folders:
         with progress("injecting", quiet=quiet) as advance:
             made = write_logs(file, folders[0], settings=given, workers=replace(workers, progress=advance))
-        print_skipped(made.skipped, ())
         if as_json:
             print_json(made)
         else:
             _show_logs(made)
+        print_skipped(made.skipped, ())
         leave(made.skipped)
         return
     check_coverage_files(targets, [file], force=force)
     with_traces = any(target.suffix.lower() == PAGE for target in targets)
     with progress("coverage", quiet=quiet) as advance:
         done = coverage(file, settings=given, with_traces=with_traces, workers=replace(workers, progress=advance))
-    print_skipped(done.skipped, done.findings)
     write_coverage(done, targets)
     if as_json:
+        print_skipped(done.skipped, done.findings)
         print_json(coverage_summary(done))
     else:
         show_coverage(done, quiet=quiet)
-        for target in () if quiet else targets:
-            print_line(f"written: {plain(target)}")
+        print_written(() if quiet else targets)
     leave(done.skipped)
 
 
@@ -101,3 +109,4 @@ def _show_logs(made: Injected) -> None:
         many = sum(doubt in case.doubts for case in made.logs.cases)
         print_line(f"note: {doubt.replace('_', ' ')}: {many} of {len(made.logs.cases)}")
     print_line(f"written: {plain(made.folder)}/benchmark.toml, with {counted(made.copied, 'impact-free log')}")
+    print_next("cdtool", "benchmark", f"{made.folder}/benchmark.toml", "-o", f"{made.folder}/report")

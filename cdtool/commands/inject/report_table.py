@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 from cdtool.base.plain_text import plain
-from cdtool.report.number_text import NOT_REACHED, NOTHING, number
-from cdtool.report.table import Cell, Fields, Heading, Table, empty_cell, key_of, name_cell, tabulate
+from cdtool.report.number_text import number
+from cdtool.report.table import Cell, Fields, Heading, Table, empty_cell, key_of, name_cell, number_cell, tabulate
 from cdtool.report.tables.results import detector_cell
 from cdtool.results.agreement import Agreement, agreements
 from cdtool.results.evaluated import Evaluated
@@ -26,7 +24,7 @@ class InjectedSection:
             (Heading("real"), lambda item: name_cell(item.real_group) if item.real_group else empty_cell()),
             (
                 Heading("real median [ms]", numeric=True),
-                lambda item: Cell(_milliseconds(item.real_ms), key=key_of(item.real_ms)),
+                lambda item: number_cell(item.real_ms, item.resolution_ms),
             ),
             (Heading("real n", numeric=True), lambda item: Cell(str(item.real_count), key=item.real_count)),
             (Heading("assumed"), lambda item: Cell("; ".join(item.assumed))),
@@ -41,7 +39,7 @@ class InjectedSection:
         for item in shown:
             line = f"{item.detector}: {plain(item.injected_group)} {_median_range(item)}"
             if item.real_group:
-                line += f", real ({plain(item.real_group)}) {_milliseconds(item.real_ms)}"
+                line += f", real ({plain(item.real_group)}) {number(item.real_ms, error=item.resolution_ms)}"
                 lines.append(f"{line} ms, n = {item.injected_count} and {item.real_count}")
             else:
                 lines.append(f"{line} ms, n = {item.injected_count}")
@@ -49,14 +47,9 @@ class InjectedSection:
         return [*lines, *(f"bracket: {text}" for text in assumed)]
 
 
-def _milliseconds(value: float) -> str:
-    """Return a median latency in ms, "not reached" where most contacts are missed."""
-    return NOT_REACHED if math.isinf(value) else NOTHING if math.isnan(value) else number(value)
-
-
 def _median_range(item: Agreement) -> str:
     """Return the range of the true median latency [ms] that injected contacts show."""
-    low, high = map(_milliseconds, item.range_ms)
+    low, high = (number(value, error=item.resolution_ms) for value in item.range_ms)
     return f"{low} to {high}" if low != high else low
 
 

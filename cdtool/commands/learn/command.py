@@ -8,7 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cdtool.commands.console.console import leave, plain, print_json, print_line, print_skipped, progress, table
+from cdtool.commands.console.console import (
+    leave,
+    plain,
+    print_json,
+    print_line,
+    print_next,
+    print_skipped,
+    progress,
+    table,
+)
 from cdtool.commands.console.options import (
     BudgetOption,
     ClusterOption,
@@ -74,11 +83,11 @@ def learn_signature(
             text = f"{counted(runs, 'run')}{which}, fewer than {ENOUGH_RUNS}: its limits are less certain"
             print_line(f"warning: {text}", err=True)
     print_skipped(learned.skipped, learned.findings)
-    _show(learned, output, as_json=as_json, quiet=quiet)
+    _show(learned, machine, output, as_json=as_json, quiet=quiet)
     leave(learned.skipped, learned.findings)
 
 
-def _show(learned: LearnedSignature, output: Path, *, as_json: bool, quiet: bool) -> None:
+def _show(learned: LearnedSignature, machine: Path, output: Path, *, as_json: bool, quiet: bool) -> None:
     signature = learned.signature
     if as_json:
         print_json(
@@ -102,10 +111,12 @@ def _show(learned: LearnedSignature, output: Path, *, as_json: bool, quiet: bool
             }
         )
         return
+    print_line(f"{signature.described}; written to {plain(output)}")
+    if quiet:
+        return
     rows = [
         (signature.detector, motion.described if motion else "any", runs, signature.unit)
         for motion, runs in learned.runs
     ]
-    if not quiet:
-        table([("detector", "left"), ("class", "left"), ("runs", "right"), ("unit", "left")], rows)
-    print_line(f"{signature.described}; written to {plain(output)}")
+    table([("detector", "left"), ("class", "left"), ("runs", "right"), ("unit", "left")], rows)
+    print_next("cdtool", "detect", "LOG", "--machine", machine, "--signature", output)

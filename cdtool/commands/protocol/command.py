@@ -11,7 +11,7 @@ import typer
 from cdtool.base.errors import UsageError
 from cdtool.base.exit_status import Fact, statuses_words
 from cdtool.base.plain_text import LISTED, counted
-from cdtool.commands.console.console import leave, plain, print_json, print_line, say
+from cdtool.commands.console.console import leave, plain, print_json, print_line, print_next, progress, say
 from cdtool.commands.console.options import ForceOption, JsonOption
 from cdtool.commands.console.place import Place, location
 
@@ -57,8 +57,8 @@ def init(
 
     drafted = draft_protocol(benchmark, output, force=force)
     typer.echo(drafted.text)
-    print_line(f"{plain(drafted.path)} written: {counted(drafted.to_fill_in, 'value')} to fill in, then run")
-    typer.echo(f"  cdtool protocol check {_quoted(drafted.path)}")
+    print_line(f"written: {plain(drafted.path)}, with {counted(drafted.to_fill_in, 'value')} marked FILL IN")
+    print_next("cdtool", "protocol", "check", drafted.path)
 
 
 @protocol.command(
@@ -112,7 +112,7 @@ def write(
 
     Example: cdtool protocol write sample_logs/gate/protocol.toml -o protocol.html
     """
-    from cdtool.commands.protocol.document.document import ProtocolReport
+    from cdtool.commands.protocol.document.document import protocol_document
     from cdtool.commands.protocol.making import protocol as make
     from cdtool.report.outputs import check_outputs, write_outputs
 
@@ -120,8 +120,9 @@ def write(
         raise UsageError("--output is missing", "add -o protocol.pdf or -o protocol.html")
     check_outputs(output, force=force, subject="protocol")
     names = [word for path in output for word in ("-o", path.name)]
-    made = make(file, command=shlex.join(["cdtool", "protocol", "write", str(file), *names]))
-    write_outputs(ProtocolReport(made), output, force=force, inputs=(file,), subject="protocol")
+    with progress("writing the protocol", pulses=True):
+        made = make(file, command=shlex.join(["cdtool", "protocol", "write", str(file), *names]))
+        write_outputs(protocol_document(made), output, force=force, inputs=(file,), subject="protocol")
     show_protocol(made, output)
     leave(facts=_FACTS[made.verdict.outcome])
 
@@ -131,27 +132,25 @@ def _show_checked(checked: CheckedProtocol) -> None:
     from cdtool.commands.protocol.document.words import words_of
 
     file, words = checked.file, words_of("en")
+    done = not checked.verdict.reasons
+    say("protocol file: complete" if done else "protocol file: incomplete", tone="good" if done else "unknown")
     for name, count in checked.recordings.items():
         print_line(f"{plain(name)}: {counted(count, 'recording')}")
     for due, title in (("before_test", "before the test"), ("test_day", "on the day of the test")):
         part = ProtocolVerdict(tuple(item for item in checked.verdict.reasons if item.due == due))
         sentences = [*words.reasons(part, "fail"), *words.reasons(part, "incomplete")]
         if sentences:
-            print_line(f"incomplete, {title}:")
+            print_line(f"missing {title}:")
         for sentence in sentences:
             say(f"- {sentence}", indent="  ")
     for profile in {point.profile for point in file.plan.points if point.profile}:
         if not file.profiles[profile].checked:
             say(f"note: {profile}: {file.profiles[profile].warning}; the protocol states this")
-    done = not checked.verdict.reasons
-    print_line("complete; next, the protocol:" if done else "when these are settled, the protocol:")
     folder = file.path.parent
     benchmark = file.benchmark or folder / "benchmark.toml"
-    own = [] if benchmark == file.path else ["-p", _quoted(file.path)]
-    command = ["cdtool benchmark", _quoted(benchmark), *own] if checked.has_detectors else ["cdtool protocol write"]
-    if not checked.has_detectors:
-        command.append(_quoted(file.path))
-    typer.echo("  " + " ".join([*command, "-o protocol.pdf"]))
+    own = [] if benchmark == file.path else ["-p", file.path]
+    command = ["benchmark", benchmark, *own] if checked.has_detectors else ["protocol", "write", file.path]
+    print_next("cdtool", *command, "-o", "protocol.pdf", first="next" if done else "then")
 
 
 def show_protocol(made: Protocol, written: Sequence[Path]) -> None:
@@ -171,7 +170,3 @@ def show_protocol(made: Protocol, written: Sequence[Path]) -> None:
 
 def _plain(value: object) -> object:
     return value if isinstance(value, int | float | str) else str(value)
-
-
-def _quoted(path: object) -> str:
-    return shlex.quote(plain(path))

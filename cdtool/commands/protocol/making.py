@@ -9,7 +9,7 @@ from pathlib import Path
 
 from cdtool.base.errors import ConfigurationError
 from cdtool.base.files.bounded_loading import read_toml
-from cdtool.base.remote.remote_path import joined, location
+from cdtool.base.remote.remote_path import joined, location, relative_name
 from cdtool.base.version import __version__
 from cdtool.commands.judging.runs import shown_path
 from cdtool.commands.protocol.assessment.assessment import PointAssessment, judge
@@ -102,14 +102,15 @@ def _made(file: ProtocolFile, setup: BenchmarkFile, results: Results | None, com
     verdict = judge(file.plan, points, file.path.name, assignment.absent)
     files = (*_files(file, setup), *_recordings(assignment, points, setup, results))
     detectors = results.detectors if results else ()
-    return Protocol(file.plan, points, verdict, files, excluded, detectors, __version__, command)
+    shown = command.replace(f"{base.absolute()}/", "")  # as the names of the files, relative to the benchmark file
+    return Protocol(file.plan, points, verdict, files, excluded, detectors, __version__, shown)
 
 
-def _latencies(results: Results) -> dict[tuple[str, str, int], dict[str, float | None]]:
-    """Return the latency of each detector [ms] by group, recording and contact."""
-    found: dict[tuple[str, str, int], dict[str, float | None]] = {}
+def _latencies(results: Results) -> dict[tuple[str, str, int], dict[str, tuple[float | None, float | None]]]:
+    """Return the latency of each detector, and how fine it is [ms], by group, recording and contact."""
+    found: dict[tuple[str, str, int], dict[str, tuple[float | None, float | None]]] = {}
     for row in results.contacts:
-        found.setdefault((row.group, row.recording, row.contact), {})[row.detector] = row.latency_ms
+        found.setdefault((row.group, row.recording, row.contact), {})[row.detector] = row.latency_ms, row.resolution_ms
     return found
 
 
@@ -127,7 +128,7 @@ def _files(file: ProtocolFile, setup: BenchmarkFile) -> list[FileDigest]:
     # A table [protocol] of the benchmark file is in no file of its own, and both tables may name one file of limits.
     roles = {path.resolve(): (path, role) for path, role in paths if path is not None}
     base = setup.path.parent
-    return [FileDigest(shown_path(path, base), digest_of_file(path), role) for path, role in roles.values()]
+    return [FileDigest(relative_name(path, base), digest_of_file(path), role) for path, role in roles.values()]
 
 
 def _robot_model(machine_file: Path) -> Path | None:

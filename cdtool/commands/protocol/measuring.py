@@ -159,7 +159,7 @@ def measured_point(
     item: PointLogs,
     file: ProtocolFile,
     setup: BenchmarkFile,
-    late: Mapping[tuple[str, str, int], Mapping[str, float | None]],
+    late: Mapping[tuple[str, str, int], Mapping[str, tuple[float | None, float | None]]],
 ) -> PointAssessment:
     """Return a point with its repetitions; `late` are the latencies [ms] by group, recording and contact."""
     profile = profiles_of(item, file, setup)

@@ -74,9 +74,9 @@ class ProtocolOfBenchmark:
         """Write the protocol, without replacing one of the inputs; return the lines to show."""
         if not self._documents:
             return []
-        from cdtool.commands.protocol.document.document import ProtocolReport
+        from cdtool.commands.protocol.document.document import protocol_document
 
-        report, every = ProtocolReport(self._made), (*inputs, self._file.path)
+        report, every = protocol_document(self._made), (*inputs, self._file.path)
         write_outputs(report, self._documents, force=self._force, inputs=every, subject="protocol")
         return written_lines(self._made, self._documents)
 

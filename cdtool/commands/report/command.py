@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from cdtool.commands.console.console import plain, print_line, print_skipped
+from cdtool.commands.console.console import plain, print_line
 from cdtool.commands.console.options import ForceOption, OutputOption, QuietOption
 from cdtool.commands.console.place import Place, location
 from cdtool.commands.console.summary_table import finish
@@ -42,7 +42,6 @@ def report(
     evaluated, traces, note = load_report(results)
     if note:
         print_line(f"note: {plain(note)}", err=True)
-    written = write_reports(Report(evaluated, traces), targets, force=force, quiet=quiet)
-    print_skipped(evaluated.results.skipped, evaluated.results.findings)
-    show_results(evaluated, written, quiet=quiet)
+    write_reports(Report(evaluated, traces), targets, force=force, quiet=quiet)
+    show_results(evaluated, targets, quiet=quiet)
     finish(evaluated)

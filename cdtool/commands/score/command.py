@@ -69,10 +69,10 @@ def score(
         )
     results = done.evaluated.results
     report = Report(done.evaluated, done.traces)
-    written = write_reports(report, targets, force=force, quiet=quiet, inputs=done.inputs)
-    print_skipped(results.skipped, results.findings)
+    write_reports(report, targets, force=force, quiet=quiet, inputs=done.inputs)
     if as_json:
+        print_skipped(results.skipped, results.findings)
         typer.echo(to_json(results), nl=False)
     else:
-        show_results(done.evaluated, written, quiet=quiet)
+        show_results(done.evaluated, targets, quiet=quiet)
     finish(done.evaluated)

@@ -277,6 +277,7 @@ class BenchmarkFile:
             **({"report": asdict(self.report)} if self.report != ReportTable() else {}),
             "machine": self.machine_file.machine.name,
             "machine_sha256": self.machine_file.digest,
+            **({"simulated": True} if self.machine_file.simulated else {}),
         }
 
     @property

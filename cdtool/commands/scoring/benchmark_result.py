@@ -194,15 +194,11 @@ class BenchmarkResult:
 
     def _repr_html_(self) -> str:
         """Return the verdict and the table of results of the reports, which a notebook shows."""
-        import pandas as pd
-
         from cdtool.report.model import counts_text
-        from cdtool.report.notebook import notebook_table
-        from cdtool.report.tables.results import short_results_table
+        from cdtool.report.notebook import as_frame, notebook_table
+        from cdtool.report.tables.results import results_table
 
-        table = short_results_table(self.evaluated.summaries)
-        cells = [[cell.line for cell in row] for row in table.rows]
-        rows = pd.DataFrame(cells, columns=[column.heading for column in table.columns])
+        rows = as_frame(results_table(self.evaluated.summaries))
         return notebook_table(self.headline, rows, counts_text(self.evaluated), self.results.conclusion.tone)
 
 
@@ -269,7 +265,9 @@ class BenchmarkPlots:
             hint = nearest(asked, tuple(known)) if known else "run the benchmark, or keep results.traces.json.gz"
             raise UsageError(f"no curves of '{asked}' were kept" if asked else "no curves were kept", hint)
         trace = most_informative(found)
-        return described(trigger_figure(trace), f"{trace.recording}: load cell and all detectors over time")
+        return described(
+            trigger_figure(trace, self.result.results), f"{trace.recording}: load cell and all detectors over time"
+        )
 
 
 def _names_of(trace: Trace) -> tuple[str, str]:

@@ -98,12 +98,12 @@ def check(
             settings=given_settings(settings or ()),
             workers=Workers(jobs, cluster=cluster, progress=advance),
         )
-    print_skipped(checked.skipped, [*checked.findings, *notes_on(checked.file)])
     if as_json:
         print_json(checked_as_json(checked))
     else:
         for item in checked.classes:
             show_class(item, quiet=quiet)
+    print_skipped(checked.skipped, [*checked.findings, *notes_on(checked.file)])
     nothing = all(item.coverage is None and item.drift is None for item in checked.classes)
     leave(checked.skipped, checked.findings, [Fact.NOTHING_USABLE] if nothing else ())
 

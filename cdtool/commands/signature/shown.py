@@ -109,7 +109,9 @@ def show_class(item: CheckedClass, *, quiet: bool = False) -> None:
     """Print the result of a check for one class of motion."""
     from cdtool.commands.signature.summary import summarise_signature
 
-    print_line(f"class: {item.signature.motion.described}, safety factor {item.signature.safety_factor:.4g}")
+    is_kept = item.advice.startswith("keep")
+    say(f"{item.signature.motion.described}: {item.advice}", tone="good" if is_kept else "unknown")
+    print_line(f"safety factor {item.signature.safety_factor:.4g}")
     if item.coverage:
         _show_coverage(item.coverage)
     if item.drift:
@@ -119,7 +121,6 @@ def show_class(item: CheckedClass, *, quiet: bool = False) -> None:
         if joint.moved > 0.0:
             moved = f"{joint.moved:.2f} spreads, {_moved_at(found, joint)}"
             print_line(f"since first learned: the limit of {plain(joint.joint)} moved by up to {moved}")
-    say(f"advice: {item.advice}")
 
 
 def _show_coverage(found: SignatureCoverage) -> None:

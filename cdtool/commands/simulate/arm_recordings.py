@@ -192,7 +192,7 @@ def _all_on_bus(fields: Mapping[str, Array]) -> dict[str, Array]:
 def _machine_toml(arm: ArmParameters, count: float) -> str:
     viscous = [arm.viscous_friction * ratio**2 for ratio in arm.transmission_ratio]
     scale = f"{count:.10g}"
-    return f"""# A simulated robot arm (cdtool simulate arm): what its maker would know of it.
+    return f"""simulated = true  # a robot arm by cdtool simulate arm: what its maker would know of it
 [machine]
 type = "planar_arm"
 name = "robot arm"

@@ -9,7 +9,7 @@ import typer
 
 from cdtool.base.errors import UsageError
 from cdtool.base.plain_text import counted
-from cdtool.commands.console.console import plain, print_line, progress
+from cdtool.commands.console.console import plain, print_line, print_next, progress
 from cdtool.commands.console.options import keys_option
 from cdtool.commands.console.place import Place, location
 
@@ -62,3 +62,5 @@ def simulate(
     print_line(f"{counted(written, 'recording')}, {files} and contacts.csv written to {plain(output)}")
     if why_not:
         print_line(f"no benchmark.toml: {why_not}")
+    else:
+        print_next("cdtool", "benchmark", output / "benchmark.toml", "-o", output / "report")

@@ -152,7 +152,7 @@ def _write_mcap(path: Path, run: GateRun, references: bool) -> None:
 
 def _machine_toml(gate: GateParameters) -> str:
     viscous = gate.viscous_friction * gate.transmission_ratio**2
-    return f"""# A simulated sliding gate (cdtool simulate gate): what its maker would know of it.
+    return f"""simulated = true  # a sliding gate by cdtool simulate gate: what its maker would know of it
 [machine]
 type = "linear_axis"
 name = "gate"

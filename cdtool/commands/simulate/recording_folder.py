@@ -13,6 +13,7 @@ from typing import Generic, Literal, Protocol, TypeVar
 
 from cdtool.base.errors import UsageError
 from cdtool.base.files.writing import replaced_folder
+from cdtool.formats.written_files import require_free_folder
 from cdtool.thresholds.signature import ENOUGH_RUNS, LEAST_RUNS
 
 IMPACT_OF: Mapping[str, Literal["none", "stiff", "soft"]] = {
@@ -88,8 +89,7 @@ def write_folder(
     planned = list(_plan(counts, file_format))
     if not planned:
         raise UsageError("no recording is requested", "give a number above 0 for free, holdout, stiff or soft")
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise UsageError(f"{folder} exists and is not an empty folder", "choose another --output")
+    require_free_folder(folder)
     with replaced_folder(folder) as part:
         _write_all(part, planned, bench, progress)
     return len(planned)

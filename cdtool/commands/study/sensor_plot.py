@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cdtool.detectors.look import BLUE, OCHRE, PLUM, RUST, TEAL
 from cdtool.impact.sensor_ranking import Ranking, SensorResponse
-from cdtool.report.number_text import number
+from cdtool.report.number_text import number, short
 from cdtool.report.plots.figures import drawing, label, new_figure, save
 from cdtool.report.plots.style import FORCE
 
@@ -17,11 +18,11 @@ if TYPE_CHECKING:
 
 # Kinds of sensor by location, from the contact to the controller.
 _COLOURS = {
-    "contact_force": "#D55E00",
-    "drive_force": "#E69F00",
-    "load_acceleration": "#009E73",
-    "motor_position": "#0072B2",
-    "motor_force": "#B0569B",
+    "contact_force": RUST,
+    "drive_force": OCHRE,
+    "load_acceleration": TEAL,
+    "motor_position": BLUE,
+    "motor_force": PLUM,
 }
 
 
@@ -48,7 +49,8 @@ def plot_ranking(ranking: Ranking, path: Path) -> None:
             f"time since the touch until the deviation exceeds {ranking.factor:g} σ of noise and the resolution [ms]"
         )
         case = ranking.case
-        title = f"{case.transmission.load_mass:.3g} kg at {case.speed:g} m/s on {number(case.obstacle.stiffness)} N/m"
+        moving = f"{short(case.transmission.load_mass)} kg at {short(case.speed)} m/s"
+        title = f"{moving} on {number(case.obstacle.stiffness)} N/m"
         upper.set_title(title, loc="left", fontweight="bold")
         save(figure, path)
 
@@ -80,9 +82,9 @@ def _draw_row(axes: Axes, row: int, response: SensorResponse, end: float) -> Non
         return
     at = 1e3 * response.time
     axes.barh(row, at, height=0.42, color=colour)
-    words = f"{at:.1f} ms, {response.force:.0f} N"
+    words = f"{number(at)} ms, {number(response.force)} N"
     if (response.peak_so_far or 0.0) > 1.05 * (response.force or 0.0):
-        words += f" (up to {response.peak_so_far:.0f} N before)"
+        words += f" (up to {number(response.peak_so_far)} N before)"
     right = at < 0.6 * end
     axes.text(
         at + (0.008 if right else -0.008) * end,

@@ -11,10 +11,10 @@ from cdtool.commands.console.colour import Toned
 from cdtool.commands.console.console import (
     leave,
     number,
-    plain,
     print_json,
-    print_line,
+    print_next,
     print_skipped,
+    print_written,
     progress,
     say,
     table,
@@ -69,15 +69,16 @@ def tune(
     open_folder(output, setup.inputs, setup.detectors, force=force)
     with progress("tuning", quiet=quiet) as advance:
         done = tune_detectors(setup, replace(options, workers=Workers(jobs, progress=advance)))
-    written = write_tuning(done, output)
+    write_tuning(done, output)
     left_out = [*done.left_out, *(Skipped(name, f"not tuned: {reason}") for name, reason in done.unusable.items())]
-    print_skipped(left_out, done.findings)
     if as_json:
         print_json(tuning_summary(done))
     else:
         _show(done, quiet=quiet)
-        for path in () if quiet else written:
-            print_line(f"written: {plain(path)}")
+    print_skipped(left_out, done.findings)
+    if not (as_json or quiet):
+        print_written([output], first="tuning.html")
+        print_next("cdtool", "benchmark", output / "benchmark.toml")
     leave(left_out, done.findings)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 from cdtool.base.plain_text import plain
@@ -24,16 +23,11 @@ class PageTable:
         """The id of the table in the page."""
         return f"{self.table.name.replace('_', '-')}-table"
 
-    @cached_property
-    def narrow(self) -> Table:
-        """The table as the page lays it out."""
-        return self.table.narrow()
-
     @property
     def paged(self) -> bool:
         """Whether the script pages through it; without script all rows are shown."""
         # A browser needs long to lay out more rows.
-        return bool(self.table.logs) or len(self.table.rows) > 150
+        return bool(self.table.logs) or (len(self.table.rows) > 150 and not self.table.parts)
 
     @property
     def opens(self) -> dict[int, list[int]]:
@@ -42,7 +36,7 @@ class PageTable:
 
     def values(self) -> dict[str, Any]:
         """Return JSON values, column by column."""
-        table = self.narrow
+        table = self.table
         marks = {name: [i for i, marked in enumerate(rows) if marked] for name, rows in table.marks.items()}
         return {
             "name": self.name,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from cdtool.base.errors import CdtoolError
 from cdtool.report.html.page_tables import classes, visible
-from cdtool.report.html.self_contained import content_policy, page_part, page_template
+from cdtool.report.html.self_contained import content_policy, page_template, style_sheet
 from cdtool.report.plots.figures import encoded
 from cdtool.report.table import Cell, Heading, Table, name_cell
 from cdtool.results.results import RecordingFinding, Skipped
@@ -56,7 +56,7 @@ class SectionsPage:
         """Return the page."""
         from markupsafe import Markup
 
-        style = page_part("report.css") + "img {\n  max-width: 100%;\n  height: auto;\n  background: #ffffff;\n}\n"
+        style = style_sheet("img {\n  max-width: 100%;\n  height: auto;\n  background: #ffffff;\n}\n")
         template = page_template("sections.html.j2")
         return template.render(page=self, style=Markup(style), policy=content_policy(style), classes=classes)
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cdtool.report.html.page_tables import visible
+from cdtool.report.plots.style import page_colours
 
 if TYPE_CHECKING:
     from jinja2 import Template
@@ -24,6 +25,11 @@ _ESCAPES = str.maketrans({character: f"\\u{ord(character):04x}" for character in
 def page_part(name: str) -> str:
     """Return the text of a file of the pages: a style sheet, a script, a template."""
     return (_FOLDER / name).read_text(encoding="utf-8")
+
+
+def style_sheet(more: str = "") -> str:
+    """Return the style of all pages, with the colours of the figures, and more of a page's own."""
+    return page_colours() + page_part("report.css") + more
 
 
 @cache

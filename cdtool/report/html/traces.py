@@ -17,6 +17,9 @@ from cdtool.base.arrays import FloatArray
 from cdtool.base.files.strict_json import finite
 from cdtool.base.files.typed_json import plain as values_of
 from cdtool.base.plain_text import plain
+from cdtool.report.number_text import number
+from cdtool.report.plots.figures import unit_label
+from cdtool.report.plots.trace_words import UNKNOWN, LatencyTexts, rows_in_order, trace_words, triggers_of, verdict_of
 from cdtool.results.traces.trace import LEVELS, TIME_DECIMALS, Panel, Trace
 
 ALPHABET = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
@@ -27,8 +30,8 @@ _BYTES = np.frombuffer(ALPHABET.encode(), dtype=np.uint8)
 HEIGHTS = {"force": 138, "row": 120, "axis": 44}
 
 
-def trace_data(trace: Trace, detectors: Mapping[str, int]) -> dict[str, Any]:
-    """One trace as JSON values; `detectors` are numbered."""
+def trace_data(trace: Trace, detectors: Mapping[str, int], texts: LatencyTexts = UNKNOWN) -> dict[str, Any]:
+    """One trace as JSON values, its rows in the order of the plot; `detectors` are numbered."""
     # Neighbouring times are at most so many steps apart that the page's 32-bit numbers hold them.
     time_step = max(10.0**-TIME_DECIMALS, (trace.end - trace.start) / 1e9)
     made: dict[str, Any] = {
@@ -39,12 +42,17 @@ def trace_data(trace: Trace, detectors: Mapping[str, int]) -> dict[str, Any]:
             for contact in trace.contacts
         ],
         "force_time": _curve(trace.force_time, trace.start, time_step),
-        "force": _curve(trace.force, *_scale(trace.force)),
+        "force": packed_curve(trace.force),
         "panels": [
-            _panel(panel, detectors[panel.detector], _curve(panel.course.time, trace.start, time_step))
-            for panel in trace.panels
+            {
+                **_panel(panel, detectors[panel.detector], _curve(panel.course.time, trace.start, time_step)),
+                "words": [plain(words) for words in verdict_of(trace, panel, texts)],
+                "held": triggers_of(trace, panel, (trace.start, trace.end)),
+            }
+            for panel in rows_in_order(trace)
             if panel.detector in detectors
         ],
+        "words": [*map(plain, trace_words(trace)), *_onset_words(trace)],
         "height": plot_height(trace),
     }
     return {key: finite(value) for key, value in made.items()}
@@ -54,17 +62,25 @@ def _panel(panel: Panel, detector: int, time: Mapping[str, Any]) -> dict[str, An
     course = panel.course
     scale = _scale(course.value, course.lower, course.upper)
     return {
-        **{key: plain(getattr(panel, key)) for key in ("unit", "joint", "verdict", "reason")},
+        "joint": plain(panel.joint),
+        "unit": unit_label(panel.unit),
         "detector": detector,
-        "seen": [{**values_of(seen), "reason": plain(seen.reason)} for seen in panel.seen],
+        "seen": [values_of(seen) for seen in panel.seen],
         "alarms": panel.alarms,
         "false_alarms": panel.false_alarms,
-        "rearmed": panel.rearmed,
         "why": [plain(line) for line in panel.why],
         "time": time,
         **{name: _curve(getattr(course, name), *scale) for name in ("value", "lower", "upper")},
         "status": [[code, len(list(same))] for code, same in groupby(course.status.tolist())],
     }
+
+
+def _onset_words(trace: Trace) -> list[str]:
+    contact = trace.shown
+    if contact is None:
+        return []
+    exact = number(1e3 * contact.uncertainty, 2)
+    return [f"onset {contact.start:.3f} s ({plain(contact.found_by)}, ± {exact} ms)"]
 
 
 def plot_height(trace: Trace) -> int:
@@ -91,6 +107,11 @@ def packed(numbers: FloatArray) -> str:
     columns[numbers == -np.inf, 0] = ord(BELOW_ALL)
     text = columns.ravel()
     return text[text > 0].tobytes().decode()
+
+
+def packed_curve(values: FloatArray) -> dict[str, Any]:
+    """Return a curve (n,) with its least value and the step in which it is written."""
+    return _curve(values, *_scale(values))
 
 
 def _scale(*curves: FloatArray) -> tuple[float, float]:

@@ -16,8 +16,8 @@ _ACTIVE = re.compile(r"([\\`*\[\]<>|&$#~!]|:(?! )|(?<![A-Za-z0-9])_|_(?![A-Za-z0
 _REFERENCE = re.compile(r"([@#])(?=\w)")
 _NO_WIDTH = "\u200b"
 _ADDRESS = re.compile(r"(www)\.", re.IGNORECASE)
-# A usual name of a log is shorter; results.json has all of it.
-_LONGEST_CELL = 200
+# A usual name of a log is shorter, and so is a sentence; results.json has all of it.
+_LONGEST_CELL = 300
 _BLANK = "\n\n"
 
 
@@ -29,11 +29,13 @@ def escape(text: object, longest: int | None = _LONGEST_CELL) -> str:
 
 
 def table_lines(table: Table) -> list[str]:
-    """Return the table as Markdown, line by line: headings, rule, rows."""
+    """Return the table as Markdown, line by line: headings, rule, rows; a part's heading is above its first row."""
     rule = ("---:" if column.numeric else "---" for column in table.columns)
     headings = (column.heading for column in table.columns)
-    rows = (map(_cell, row, table.columns) for row in table.rows)
-    return [_line(cells) for cells in (headings, rule, *rows)]
+    rows = [_line(map(_cell, row, table.columns)) for row in table.rows]
+    for place, part in table.parts.items():
+        rows[place] = f"{_line([f'**{escape(part.text)}**', *[''] * (len(table.columns) - 1)])}\n{rows[place]}"
+    return [_line(headings), _line(rule), *rows]
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,12 @@
 """Median latency against false alarms, with the limits of every detector moved (AMOC): a panel per group.
 
-The horizontal axis shows rates; to their left is a zone for points without a false alarm.
+The horizontal axis shows rates; a strip of its own at the left has the points without a false alarm.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,15 +18,13 @@ from cdtool.report.number_text import NOTHING, number
 from cdtool.report.plots.figures import (
     between,
     drawing,
-    label,
     message_figure,
     save,
     write,
 )
-from cdtool.report.plots.labels import Labelled, write_labels
-from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range, set_ticks
-from cdtool.report.plots.side_table import NAME_LENGTH, SideColumn, SideTable, keyed_panels, rank
-from cdtool.report.plots.style import BAND, look_of
+from cdtool.report.plots.latency_axis import FLOOR_MS, LatencyAxis
+from cdtool.report.plots.side_table import SideColumn, SideTable, keyed_panels
+from cdtool.report.plots.style import BAND, line_of, look_of
 from cdtool.report.writers.base import Image, Report
 from cdtool.results.curves.amoc import AmocCurve, amoc_curves
 from cdtool.results.evaluated import Evaluated
@@ -44,8 +41,8 @@ _FIGURES = (
     SideColumn("not\nassessable", 50),
     SideColumn("false alarms\nin hold-out", 66),
 )
-# Share of a panel's width for the points without a false alarm.
-_ZONE = 0.27
+# Shares of a panel's width for the strip of the points without a false alarm, and for it with its distance.
+_STRIP, _RATES_FROM = 0.24, 0.27
 
 
 @drawing()
@@ -57,46 +54,69 @@ def amoc_figure(evaluated: Evaluated) -> Figure:
         text = "no impact-free hold-out, or none that is assessable: no false alarms to compare with latencies"
         return message_figure(text)
     rows = {group: [item for item in evaluated.summaries if item.group == group] for group in groups}
+    names = tuple(dict.fromkeys(item.detector for item in curves))
     figure, panels, table = keyed_panels(rows, _FIGURES, (5.2, 2.5), bottom=0.9)
-    frame = _rate_frame(curves)
-    _set_rates(panels[-1], frame)
-    low, high, logarithmic = latency_range(np.array([point.median for item in curves for point in item.points]))
+    _set_rates(panels[-1], curves)
+    scale = amoc_axis(curves)
     for axes, group in zip(panels, groups, strict=True):
-        _set_latencies(axes, low, high, logarithmic)
-        frame.shade(axes)
+        strip = _strip_of(axes, names)
+        scale.set(axes, "y")
+        # Room above the highest point for an arrow.
+        axes.set_ylim(scale.low, (1.3 if scale.logarithmic else 1.08) * scale.high)
+        axes.grid(color="0.9", linewidth=0.6)
         shown = [item for item in curves if item.group == group]
         for item in shown:
-            _draw_curve(axes, item, frame)
-        _name_curves(axes, shown, frame)
+            quiet = np.array([point.false_alarms == 0 for point in item.points])
+            column = np.full(len(quiet), float(names.index(item.detector)))
+            _draw_points(strip, item, column, quiet, scale)
+            _draw_points(axes, item, _rates(item), ~quiet, scale)
         by_name = {item.detector: item for item in shown}
-        medians = {name: item.set_point.median for name, item in by_name.items()}
-        ordered = sorted(rows[group], key=lambda row: rank(medians.get(row.detector, math.nan)))
-        for i, row in enumerate(ordered):
+        for i, row in enumerate(rows[group]):
             _write_row(table, axes, i, row, by_name.get(row.detector))
-    _explain(panels[-1], curves, floored=logarithmic)
+    _explain(panels[-1], strip, curves, floored=scale.logarithmic)
     return figure
 
 
-def _heights(axes: Axes, item: AmocCurve) -> FloatArray:
+def amoc_axis(curves: Sequence[AmocCurve]) -> LatencyAxis:
+    """Return the axis of the medians of all points."""
+    return LatencyAxis.of(np.array([point.median for item in curves for point in item.points]))
+
+
+def _rates(item: AmocCurve) -> FloatArray:
+    return np.array([item.rate(point) for point in item.points])
+
+
+def _heights(item: AmocCurve, scale: LatencyAxis) -> FloatArray:
     """Return the medians of a curve as drawn [ms]: on a logarithmic axis at least its lower end."""
-    medians = np.array([point.median for point in item.points])
-    return np.maximum(medians, FLOOR_MS) if axes.get_yscale() == "log" else medians
+    return np.maximum([point.median for point in item.points], scale.low)
 
 
-def _draw_curve(axes: Axes, item: AmocCurve, frame: _RateFrame) -> None:
-    look, x = look_of(item.detector), frame.x(item)
-    y = _heights(axes, item)
-    inside = np.array([point.false_alarms == 0 for point in item.points])
-    drawn = np.where(np.isfinite(y), y, np.nan)
-    same = inside[1:] == inside[:-1]
-    for kind, width, style in ((same, 1.0, "-"), (~same, 0.7, ":")):
-        axes.plot(*_segments(x, drawn, kind), color=look.colour, linewidth=width, linestyle=style, zorder=3)
+def _strip_of(axes: Axes, names: Sequence[str]) -> Axes:
+    """Return the strip left of a panel, which takes room and title of it; it has a column for each detector."""
+    box = axes.get_position()
+    strip = axes.figure.add_axes((box.x0, box.y0, _STRIP * box.width, box.height), sharey=axes, facecolor=BAND)
+    axes.set_position((box.x0 + _RATES_FROM * box.width, box.y0, (1.0 - _RATES_FROM) * box.width, box.height))
+    strip.set_title(axes.get_title(loc="left"), loc="left", fontweight="bold", y=1.0)
+    axes.set_title("", loc="left")
+    axes.tick_params(axis="y", labelleft=False, length=0)
+    strip.set_ylabel(AXES["median"])
+    strip.grid(axis="y", color="white", linewidth=0.8)
+    strip.set_xlim(-0.7, len(names) - 0.3)
+    strip.set_xticks([])
+    return strip
+
+
+def _draw_points(axes: Axes, item: AmocCurve, x: FloatArray, kept: np.ndarray, scale: LatencyAxis) -> None:
+    """Draw the points of a curve that are `kept`, at `x`; an arrow leaves the last one whose median is reached."""
+    look, y = look_of(item.detector), _heights(item, scale)
+    line = np.where(np.isfinite(y), y, np.nan)[kept]
+    axes.plot(x[kept], line, **line_of(look), linewidth=1.2, zorder=3)
     missed = np.array([point.missed > 0 for point in item.points])
     for open_mark in (False, True):
-        kept = (missed == open_mark) & np.isfinite(y)
+        marked = kept & (missed == open_mark) & np.isfinite(y)
         axes.plot(
-            x[kept],
-            y[kept],
+            x[marked],
+            y[marked],
             look.marker,
             markerfacecolor="white" if open_mark else look.colour,
             markeredgecolor=look.colour,
@@ -105,26 +125,20 @@ def _draw_curve(axes: Axes, item: AmocCurve, frame: _RateFrame) -> None:
             linestyle="none",
             zorder=4,
         )
-    for i in np.flatnonzero(np.isfinite(y[:-1]) & np.isinf(y[1:])).tolist():
-        _arrow_up(axes, (x[i], y[i]), look.colour)
-    _mark_in_use(axes, item, float(x[item.in_use]))
+    for i in np.flatnonzero(kept[:-1] & np.isfinite(y[:-1]) & np.isinf(y[1:])).tolist():
+        axes.annotate("", (x[i], y[i]), xytext=(0.0, 15.0), textcoords="offset points", arrowprops=_arrow(look.colour))
+    if kept[item.in_use]:
+        _mark_in_use(axes, item, float(x[item.in_use]), float(y[item.in_use]))
 
 
-def _segments(x: FloatArray, y: FloatArray, kept: np.ndarray) -> tuple[FloatArray, FloatArray]:
-    """Return the segments between neighbouring points that are `kept`, separated by NaN."""
-    gap = np.full(int(kept.sum()), np.nan)
-    across = np.column_stack((x[:-1][kept], x[1:][kept], gap))
-    return across.ravel(), np.column_stack((y[:-1][kept], y[1:][kept], gap)).ravel()
-
-
-def _mark_in_use(axes: Axes, item: AmocCurve, x: float) -> None:
+def _mark_in_use(axes: Axes, item: AmocCurve, x: float, y: float) -> None:
     look, point = look_of(item.detector), item.set_point
-    if math.isnan(point.median):
+    if math.isnan(y):
         return
-    reached = math.isfinite(point.median)
+    reached = math.isfinite(y)
     axes.plot(
         x,
-        float(_heights(axes, item)[item.in_use]) if reached else 0.88,
+        y if reached else 0.88,
         look.marker,
         transform=axes.transData if reached else axes.get_xaxis_transform(),
         markerfacecolor="white" if point.missed else look.colour,
@@ -137,26 +151,8 @@ def _mark_in_use(axes: Axes, item: AmocCurve, x: float) -> None:
         axes.annotate("", (x, 0.91), (x, 1.0), xycoords=axes.get_xaxis_transform(), arrowprops=_arrow("black"))
 
 
-def _arrow_up(axes: Axes, place: tuple[float, float], colour: str) -> None:
-    """Draw an arrow upward from a point: with the next safety factor the median is not reached."""
-    axes.annotate("", place, xytext=(0.0, 15.0), textcoords="offset points", arrowprops=_arrow(colour))
-
-
 def _arrow(colour: str) -> dict[str, object]:
     return {"arrowstyle": "<-", "color": colour, "linewidth": 1.0, "shrinkA": 0, "shrinkB": 0}
-
-
-def _name_curves(axes: Axes, curves: Sequence[AmocCurve], frame: _RateFrame) -> None:
-    """Write the names of curves next to their rates, low ones first; the zone without a false alarm has no room."""
-    named = []
-    for item in curves:
-        y = _heights(axes, item)
-        seen = np.isfinite(y)
-        x, y = frame.x(item)[seen], y[seen]
-        if len(x):
-            places = np.flatnonzero(x > frame.least)[::-1]
-            named.append(Labelled(label(item.detector, NAME_LENGTH), look_of(item.detector).colour, x, y, places))
-    write_labels(axes, named)
 
 
 def _write_row(table: SideTable, axes: Axes, place: int, row: Summary, curve: AmocCurve | None) -> None:
@@ -167,7 +163,7 @@ def _write_row(table: SideTable, axes: Axes, place: int, row: Summary, curve: Am
     point = curve.set_point
     cells = (
         number(point.safety_factor),
-        number(point.median),
+        number(point.median, error=row.resolution_ms),
         f"{point.missed} of {point.detected + point.missed}",
         str(curve.not_assessable),
         f"{point.false_alarms} in {curve.operations} op.",
@@ -176,84 +172,37 @@ def _write_row(table: SideTable, axes: Axes, place: int, row: Summary, curve: Am
     table.write_key(axes, place, row.detector, cells, loud)
 
 
-@dataclass(frozen=True)
-class _RateFrame:
-    """The horizontal axis: a zone without a false alarm from `left` to `least`, then rates up to `most`.
+def _set_rates(axes: Axes, curves: Sequence[AmocCurve]) -> None:
+    """Set the horizontal axis to rates; it begins slightly below that of a single false alarm."""
+    from matplotlib.ticker import FixedLocator, NullLocator
 
-    In the zone each detector has its own column: the position of a point in it does not mean a rate.
-    """
-
-    left: float
-    least: float
-    most: float
-    columns: tuple[str, ...]
-
-    def x(self, item: AmocCurve) -> FloatArray:
-        """Return the horizontal positions of a detector's points."""
-        share = (self.columns.index(item.detector) + 0.5) / len(self.columns)
-        column = self.left * (self.least / self.left) ** share
-        return np.array([item.rate(point) if point.false_alarms else column for point in item.points])
-
-    def shade(self, axes: Axes) -> None:
-        """Colour the zone."""
-        axes.axvspan(self.left, self.least, color=BAND, linewidth=0, zorder=0)
-
-
-def _rate_frame(curves: Sequence[AmocCurve]) -> _RateFrame:
-    """Return the axis; its rates begin slightly below that of a single false alarm."""
     least = 1.0 / max(item.exposure for item in curves) / 1.6
     most = max([10.0 * least, *(1.6 * item.rate(point) for item in curves for point in item.points)])
-    columns = tuple(dict.fromkeys(item.detector for item in curves))
-    return _RateFrame(least / (most / least) ** (_ZONE / (1.0 - _ZONE)), least, most, columns)
-
-
-def _set_rates(axes: Axes, frame: _RateFrame) -> None:
-    """Set the horizontal axis to rates."""
-    from matplotlib.ticker import FixedLocator, NullFormatter
-
     axes.set_xscale("log")
-    axes.set_xlim(frame.left, frame.most)
-    decades = range(math.ceil(math.log10(frame.least)), math.floor(math.log10(frame.most)) + 1)
-    minor = [step * 10.0**power for power in (*decades, decades.start - 1) for step in range(2, 10)]
-    axes.xaxis.set_major_locator(FixedLocator([10.0**power for power in decades]))
-    axes.xaxis.set_minor_locator(FixedLocator([tick for tick in minor if frame.least <= tick <= frame.most]))
+    axes.set_xlim(least, most)
+    steps = (1.0, 2.0, 5.0) if most < 100.0 * least else (1.0,)
+    decades = range(math.floor(math.log10(least)), math.ceil(math.log10(most)))
+    axes.xaxis.set_major_locator(FixedLocator([step * 10.0**power for power in decades for step in steps]))
+    axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:.12g}")
-    axes.xaxis.set_minor_formatter(NullFormatter())
 
 
-def _set_latencies(axes: Axes, low: float, high: float, logarithmic: bool) -> None:
-    """Set the vertical axis to latencies [ms]."""
-    if logarithmic:
-        axes.set_yscale("log")
-        set_ticks(axes.yaxis, low, high)
-    # Room above the highest point for an arrow.
-    axes.set_ylim(low, high * (high / low) ** 0.08 if logarithmic else 1.08 * high)
-    axes.set_ylabel(AXES["median"])
-    axes.grid(color="0.9", linewidth=0.6)
-
-
-def _explain(axes: Axes, curves: Sequence[AmocCurve], *, floored: bool) -> None:
-    """Write below the zone what no false alarm means, below the rates their unit and the meaning of the marks.
+def _explain(axes: Axes, strip: Axes, curves: Sequence[AmocCurve], *, floored: bool) -> None:
+    """Write below the strip what no false alarm means, below the rates their unit and the meaning of the marks.
 
     `floored`: the axis of latencies is logarithmic, and medians below its lower end are drawn there.
     """
     hours, bounds = [item.hours for item in curves], [item.at_most for item in curves]
     per, counts = curves[0].per, sorted({item.operations for item in curves})
     operations = f"{counts[0]} to {counts[-1]}" if len(counts) > 1 else str(counts[0])
-    zone = "\n".join(
-        (
-            f"none in {operations} operations,",
-            f"{between(min(hours), max(hours))} h",
-            f"(at most {between(min(bounds), max(bounds))} per {per})",
-        )
-    )
-    rates = f"false alarms per {per}"
-    for text, share, lift, size, side in (
-        (zone, 0.5 * _ZONE, -4.0, 7.5, "center"),
-        (rates, _ZONE + 0.5 * (1.0 - _ZONE), -22.0, 9.0, "center"),
-        (_marks(curves, floored), 0.0, -46.0, 8.0, "left"),
+    watched = f"{between(min(hours), max(hours))} h" if per == "hour" else f"{operations} operations"
+    none = f"0\nin {watched}:\nat most {between(min(bounds), max(bounds))} per {per}"
+    for panel, text, share, lift, size, side in (
+        (strip, none, 0.5, -5.0, 7.5, "center"),
+        (axes, f"false alarms per {per}, in the hold-out", 0.5, -22.0, 9.0, "center"),
+        (strip, _marks(curves, floored), 0.0, -46.0, 8.0, "left"),
     ):
-        write(axes, text, (share, 0.0), (0.0, lift), ha=side, va="top", fontsize=size, linespacing=1.35)
+        write(panel, text, (share, 0.0), (0.0, lift), ha=side, va="top", fontsize=size, linespacing=1.35)
 
 
 def _marks(curves: Sequence[AmocCurve], floored: bool) -> str:

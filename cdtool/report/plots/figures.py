@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cdtool.base.errors import OutputError, UsageError
@@ -187,6 +187,11 @@ def write(
 def label(text: object, length: int = 40) -> str:
     """Return a text from a file as a figure shows it: plain and at most `length` characters."""
     return shorten(plain(text), length)
+
+
+def log_label(name: str, length: int = 60) -> str:
+    """Return a log's name for a figure: as it was given, of an absolute path its last two parts."""
+    return label("/".join(PurePath(name).parts[-2:]) if PurePath(name).is_absolute() else name, length)
 
 
 def between(low: float, high: float, digits: int = 3) -> str:

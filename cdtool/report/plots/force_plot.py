@@ -14,9 +14,12 @@ import numpy as np
 from cdtool.base.plain_text import counted
 from cdtool.detectors.detection import Status
 from cdtool.report.model import AXES
+from cdtool.report.number_text import number, spoken
 from cdtool.report.plots.figures import drawing, label, message_figure, new_figure, save, slug, write
 from cdtool.report.plots.labels import LineLabel, place_labels
-from cdtool.report.plots.style import BAND, HATCHES, LIMIT, NOT_ASSESSED, look_of
+from cdtool.report.plots.panels import cover_peak
+from cdtool.report.plots.style import BAND, HATCHES, LIMIT_LINE, NOT_ASSESSED, WORST, look_of
+from cdtool.report.plots.trace_words import UNKNOWN, LatencyTexts
 from cdtool.report.writers.base import Image, Report
 from cdtool.results.results import Results, grouped
 from cdtool.results.traced_force import TracedForce, force_profiles, traced_forces
@@ -30,7 +33,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _PALE = "0.72"
-_WORST = "#A3123F"
 #: More pale curves are one grey area.
 _MOST_CURVES = 100
 #: Lines that fit beside the curve.
@@ -45,7 +47,9 @@ _TICKS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
 
 
 @drawing()
-def force_figure(groups: Mapping[str, Sequence[TracedForce]], profile: ForceProfile) -> Figure:
+def force_figure(
+    groups: Mapping[str, Sequence[TracedForce]], profile: ForceProfile, texts: LatencyTexts = UNKNOWN
+) -> Figure:
     """Return a panel for each group of contacts: its worst contact coloured, the others grey.
 
     The worst contact fails with the largest share of a limit. Right of the first grey line time is compressed: each
@@ -54,18 +58,19 @@ def force_figure(groups: Mapping[str, Sequence[TracedForce]], profile: ForceProf
     shown = [group for group, curves in groups.items() if curves]
     if not shown:
         return message_figure("no contact with a load-cell force")
-    ranked = [sorted(groups[group], key=_badness) for group in shown]
+    ranked = [sorted(groups[group], key=badness) for group in shown]
     nodes = _time_nodes(ranked, profile)
     figure = new_figure(9.5, 1.5 + 2.3 * len(shown))
     rows = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
     for axes, group, curves in zip(rows, shown, ranked, strict=True):
         _set_time(axes, nodes)
         _draw_limits(axes, profile, nodes)
-        axes.set_ylim(0.0, 1.12 * max(_highest(curves), 1.1 * profile.steps[0].at_most_n))
+        axes.set_ylim(bottom=0.0)
+        cover_peak(axes, max(_highest(curves), 1.1 * profile.steps[0].at_most_n))
         _draw_curves(axes, curves)
         axes.set_ylabel(AXES["force"])
         axes.set_title(label(group, 60), loc="left", fontweight="bold")
-        _write_outcomes(axes, curves)
+        _write_outcomes(axes, curves, texts)
     rows[-1].set_xlabel(AXES["time"] + ("; compressed right of the first grey line" if len(nodes) > 2 else ""))
     figure.suptitle(f"{label(profile.title, 70)}", fontsize=10, x=0.01, ha="left")
     footer = "evidence, not a certificate" + (f"; {profile.warning}" if profile.warning else "")
@@ -83,7 +88,8 @@ def force_figure(groups: Mapping[str, Sequence[TracedForce]], profile: ForceProf
     return figure
 
 
-def _badness(curve: TracedForce) -> tuple[int, float]:
+def badness(curve: TracedForce) -> tuple[int, float]:
+    """Return by what contacts are ordered, the worst first: it fails with the largest share of a limit."""
     return _ORDER.index(curve.verdict.outcome), -curve.verdict.utilisation
 
 
@@ -97,7 +103,7 @@ def _draw_limits(axes: Axes, profile: ForceProfile, nodes: Sequence[float]) -> N
     forces = [step.at_most_n for step in profile.steps]
     times, heights = [*begins, nodes[-1]], [*forces, forces[-1]]
     axes.fill_between(times, heights, step="post", color=BAND, linewidth=0, zorder=0.4)
-    axes.step(times, heights, where="post", color=LIMIT, linestyle=(0, (4, 2)), linewidth=1.0, zorder=2)
+    axes.step(times, heights, where="post", **LIMIT_LINE, zorder=2)
 
 
 def _name_limits(axes: Axes, curves: Sequence[TracedForce], profile: ForceProfile, nodes: Sequence[float]) -> None:
@@ -114,7 +120,7 @@ def _name_limits(axes: Axes, curves: Sequence[TracedForce], profile: ForceProfil
 def _draw_curves(axes: Axes, curves: Sequence[TracedForce]) -> None:
     """Draw the worst contact on top, the next ones grey, the rest paler."""
     for rank, curve in reversed(list(enumerate(curves[:_MOST_CURVES]))):
-        colour, width = (_WORST, 1.5) if rank == 0 else ("0.45", 0.8) if rank < 6 else (_PALE, 0.5)
+        colour, width = (WORST, 1.5) if rank == 0 else ("0.45", 0.8) if rank < 6 else (_PALE, 0.5)
         # As many samples as the plot is wide in pixels.
         kept = kept_samples(axes.xaxis.get_transform().transform(curve.time), curve.force, 700)
         axes.plot(curve.time[kept], curve.force[kept], color=colour, linewidth=width, zorder=4 if rank == 0 else 3)
@@ -125,13 +131,13 @@ def _draw_curves(axes: Axes, curves: Sequence[TracedForce]) -> None:
     seen = [step for step in worst.verdict.steps if math.isfinite(step.peak)]
     if seen:
         peak = max(seen, key=lambda step: step.peak)
-        _point(axes, (peak.peak_at, peak.peak), f"{peak.peak:.0f} N at {1e3 * peak.peak_at:.0f} ms", 4)
+        _point(axes, (peak.peak_at, peak.peak), f"{number(peak.peak)} N at {number(1e3 * peak.peak_at)} ms", 4)
     for step in worst.verdict.steps:
         if step.time_budget == worst.verdict.time_budget and math.isfinite(step.time_budget):
             place = (step.time_budget, step.step.at_most_n)
-            axes.plot(*place, "o", markersize=5, markerfacecolor="white", markeredgecolor=_WORST, zorder=6)
+            axes.plot(*place, "o", markersize=5, markerfacecolor="white", markeredgecolor=WORST, zorder=6)
             lift = -4 if step.step.at_most_n > 0.15 * axes.get_ylim()[1] else 14  # clear of the time axis
-            _point(axes, place, f"{1e3 * step.time_budget:.1f} ms", lift)
+            _point(axes, place, f"{number(1e3 * step.time_budget)} ms", lift)
     for detector, time in worst.alarms.items():
         if not time <= worst.time[-1]:
             continue
@@ -150,30 +156,31 @@ def _point(axes: Axes, place: tuple[float, float], text: str, lift: float) -> No
         textcoords="offset points",
         va="top" if lift < 0.0 else "bottom",
         fontsize=8,
-        color=_WORST,
+        color=WORST,
         bbox={"facecolor": "white", "alpha": 0.75, "linewidth": 0, "pad": 1.0},
         zorder=8,
     )
 
 
-def _write_outcomes(axes: Axes, curves: Sequence[TracedForce]) -> None:
+def _write_outcomes(axes: Axes, curves: Sequence[TracedForce], texts: LatencyTexts) -> None:
     """Write right of a panel how many contacts meet the limits, and each step of the worst contact."""
     worst = curves[0]
     outcomes = [curve.verdict.outcome for curve in curves]
-    counts = ", ".join(
-        f"{outcomes.count(outcome)} {outcome.replace('_', ' ')}" for outcome in _ORDER if outcome in outcomes
-    )
+    counts = ", ".join(f"{outcomes.count(outcome)} {spoken(outcome)}" for outcome in _ORDER if outcome in outcomes)
     lines = [f"{counted(len(curves), 'contact')}:", *fill(counts, 30).splitlines()]
     lines.append(f"worst: {label(worst.name, 26)}")
     lines += [_step_text(step) for step in worst.verdict.steps]
     if math.isfinite(worst.verdict.time_budget):
-        lines.append(f"first exceeded after {1e3 * worst.verdict.time_budget:.1f} ms")
+        lines.append(f"first exceeded after {number(1e3 * worst.verdict.time_budget)} ms")
     alarms = sorted(worst.alarms.items(), key=lambda item: item[1])
-    lines += [f"alarm {label(detector, 18)} {1e3 * time:.0f} ms" for detector, time in alarms[:_ALARMS_LISTED]]
+    late = [(detector, texts.text(worst.group, worst.recording, detector, time)) for detector, time in alarms]
+    lines += [f"alarm {label(detector, 18)} {words} ms" for detector, words in late[:_ALARMS_LISTED]]
     if len(alarms) > _ALARMS_LISTED:
         lines.append(f"and {len(alarms) - _ALARMS_LISTED} later")
-    verdict = worst.verdict.outcome.replace("_", " ")
-    for text, lift, size, weight in ((verdict, 0, 10, "bold"), ("\n".join(lines), -15, 8, "normal")):
+    for text, lift, size, weight in (
+        (spoken(worst.verdict.outcome), 0, 10, "bold"),
+        ("\n".join(lines), -15, 8, "normal"),
+    ):
         write(axes, text, (1.0, 1.0), (10, lift), va="top", fontsize=size, fontweight=weight)
 
 
@@ -181,7 +188,7 @@ def _step_text(step: StepVerdict) -> str:
     name = label(step.step.name, 22)
     if step.outcome == "not_assessable":
         return f"{name}: not assessable"
-    return f"{name}: {step.peak:.0f} of {step.step.at_most_n:g} N"
+    return f"{name}: {number(step.peak)} of {step.step.at_most_n:g} N"
 
 
 def _handles(ranked: Sequence[Sequence[TracedForce]], end: float) -> list[Artist]:
@@ -189,7 +196,7 @@ def _handles(ranked: Sequence[Sequence[TracedForce]], end: float) -> list[Artist
     from matplotlib.patches import Patch
 
     handles: list[Artist] = [
-        Line2D([], [], color=_WORST, linewidth=1.5, label="worst contact"),
+        Line2D([], [], color=WORST, linewidth=1.5, label="worst contact"),
         Patch(facecolor=BAND, edgecolor="none", label="allowed"),
     ]
     if any(len(curves) > 1 for curves in ranked):
@@ -258,7 +265,10 @@ def write_forces(report: Report, folder: Path) -> list[Image]:
         file = "forces.png" if len(shown) == 1 else f"forces_{slug(name, taken)}.png"
         judged = sum(row.profile == name for row in results.forces)
         images.append(Image(file, _force_caption(results, name, len(items), judged)))
-        save(force_figure(grouped(items, "group"), force_profiles(results)[name]), folder / file)
+        save(
+            force_figure(grouped(items, "group"), force_profiles(results)[name], LatencyTexts.of(results)),
+            folder / file,
+        )
     return images
 
 

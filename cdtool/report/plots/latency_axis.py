@@ -1,8 +1,10 @@
-"""The axis of latencies, the same in all figures: linear from 0, logarithmic if they differ more than tenfold."""
+"""The axis of latencies, the same in all figures and pages: from a tick at or before all values to one at or beyond."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -10,39 +12,54 @@ from cdtool.base.arrays import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
 
 # The lower end of a logarithmic axis [ms].
 FLOOR_MS = 1.0
-# Round numbers of a decade; the coarse ones if the ends differ by more than this factor.
+#: If latencies differ more than fivefold, a linear axis would press most of them together.
+_WIDE = 5.0
+# Round numbers of a decade; the coarse ones if the ends differ more than fiftyfold.
 _FINE, _COARSE = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0), (1.0, 2.0, 5.0)
 
 
-def latency_range(values: FloatArray) -> tuple[float, float, bool]:
-    """Return beginning and end of the axis [ms] for latencies (n,) [ms], and whether it is logarithmic."""
-    finite = values[np.isfinite(values)]
-    if not len(finite):
-        return 0.0, 1000.0, False
-    lowest, highest = max(float(finite.min()), FLOOR_MS), max(float(finite.max()), FLOOR_MS)
-    if highest <= 10.0 * lowest:
-        return 0.0, 1.06 * highest, False
-    return lowest / 1.15, 1.15 * highest, True
+@dataclass(frozen=True)
+class LatencyAxis:
+    """Its ticks [ms] in ascending order, the ends of the axis among them; linear axes begin at 0."""
 
+    ticks: tuple[float, ...]
+    logarithmic: bool
 
-def set_ticks(axis: Axis, low: float, high: float) -> None:
-    """Set the ticks of a logarithmic axis of latencies at round numbers from `low` to `high` [ms]."""
-    from matplotlib.ticker import FixedLocator, NullLocator
+    @classmethod
+    def of(cls, values: FloatArray) -> LatencyAxis:
+        """Return the axis for latencies (n,) [ms]; those that are not finite do not count."""
+        finite = np.maximum(values[np.isfinite(values)], FLOOR_MS)
+        lowest, highest = (float(finite.min()), float(finite.max())) if len(finite) else (1000.0, 1000.0)
+        logarithmic = highest > _WIDE * lowest
+        steps = _FINE if logarithmic and highest < 50.0 * lowest else _COARSE
+        rounded = [step * 10.0**power for power in range(-1, 10) for step in steps]
+        if logarithmic:
+            first = max(tick for tick in rounded if tick <= lowest)
+            last = min(tick for tick in rounded if tick >= highest)
+            return cls(tuple(tick for tick in rounded if first <= tick <= last), True)
+        width = next(step for step in rounded if 6.0 * step >= highest)
+        return cls(tuple(width * i for i in range(math.ceil(highest / width) + 1)), False)
 
-    steps = _FINE if high < 100.0 * low else _COARSE
-    ticks = [step * 10.0**power for power in range(8) for step in steps]
-    axis.set_major_locator(FixedLocator([tick for tick in ticks if low <= tick <= high]))
-    axis.set_minor_locator(NullLocator())
-    axis.set_major_formatter(lambda value, _: f"{value:g}")
+    @property
+    def low(self) -> float:
+        """The beginning of the axis [ms]; on a logarithmic one, shorter latencies are drawn there."""
+        return self.ticks[0]
 
+    @property
+    def high(self) -> float:
+        """The end of the axis [ms]."""
+        return self.ticks[-1]
 
-def set_latency_scale(axes: Axes, low: float, high: float, logarithmic: bool) -> None:
-    """Set the horizontal axis to latencies from `low` to `high` [ms]."""
-    if logarithmic:
-        axes.set_xscale("log")
-        set_ticks(axes.xaxis, low, high)
-    axes.set_xlim(low, high)
+    def set(self, axes: Axes, which: Literal["x", "y"]) -> None:
+        """Set scale and ticks of an axis of a figure, not its ends: there may be more room than for latencies."""
+        from matplotlib.ticker import FixedLocator, NullLocator
+
+        if self.logarithmic:
+            axes.set(**{f"{which}scale": "log"})
+        axis = axes.xaxis if which == "x" else axes.yaxis
+        axis.set_major_locator(FixedLocator(self.ticks))
+        axis.set_minor_locator(NullLocator())
+        axis.set_major_formatter(lambda value, _: f"{value:g}")

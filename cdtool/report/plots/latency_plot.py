@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,9 +25,10 @@ from cdtool.report.plots.figures import (
     text_width,
     write,
 )
-from cdtool.report.plots.latency_axis import FLOOR_MS, latency_range, set_latency_scale
+from cdtool.report.plots.latency_axis import FLOOR_MS, LatencyAxis
 from cdtool.report.plots.side_table import SideColumn, SideTable, count_cells
 from cdtool.report.plots.style import look_of
+from cdtool.report.table import shown
 from cdtool.report.writers.base import Image, Report
 from cdtool.results.evaluated import Evaluated
 from cdtool.results.results import Results
@@ -60,30 +62,16 @@ class _Marks:
 
 @dataclass(frozen=True)
 class _Axis:
-    """The time axis [ms]: data from `low` to `end`, then the strip of missed contacts up to `high`, if there is one."""
+    """The time axis [ms]: `scale`, then the strip of missed contacts up to `high`, if there is one."""
 
-    low: float
-    end: float
+    scale: LatencyAxis
     high: float
-    logarithmic: bool
 
-    def shown(self, times: FloatArray) -> FloatArray:
-        """Return where times are drawn: at least the lower end of a logarithmic axis, beyond its end in the strip."""
-        inside = np.maximum(times, FLOOR_MS) if self.logarithmic else times
-        # Low-discrepancy sequences spread the marks evenly, without random numbers.
-        share = 0.2 + 0.6 * (0.7548776662 * np.arange(len(times), dtype=np.float64) % 1.0)
-        return np.asarray(np.where(times > self.end, self._strip(share), inside))
-
-    def placed(self, time: float) -> float:
-        """Return where one time is drawn: as `shown`, beyond the end in the middle of the strip."""
-        if time > self.end:
-            return float(self._strip(np.array(0.5, dtype=np.float64)))
-        return max(time, FLOOR_MS) if self.logarithmic else time
-
-    def _strip(self, share: FloatArray) -> FloatArray:
-        if self.logarithmic:
-            return np.asarray(self.end * (self.high / self.end) ** share)
-        return self.end + (self.high - self.end) * share
+    def shown(self, times: FloatArray | float) -> FloatArray:
+        """Return where times are drawn: beyond the end of the scale in the middle of the strip."""
+        ends = self.scale.high, self.high
+        middle = math.sqrt(ends[0] * ends[1]) if self.scale.logarithmic else 0.5 * sum(ends)
+        return np.asarray(np.where(np.greater(times, ends[0]), middle, np.maximum(times, self.scale.low)))
 
 
 @drawing()
@@ -96,22 +84,22 @@ def latency_figure(evaluated: Evaluated) -> Figure:
     known = _all_marks(evaluated.results)
     marks = {key: known[key] for key in ((item.detector, item.group) for item in summaries)}
     impact_free = list(dict.fromkeys(item.group for item in evaluated.summaries if not item.contacts))
-    more = [SideColumn(f"false alarms\nin {label(group, 11)}", 70.0) for group in impact_free]
+    more = [SideColumn(f"false alarms\nin {label(shown(group), 11)}", 70.0) for group in impact_free]
     table = SideTable((*_COLUMNS, *more))
     rows = {group: [item for item in summaries if item.group == group] for group in groups}
     names = [label(item.detector, 28) for item in summaries]
-    axis = _axis_of(list(marks.values()))
+    axis = _axis_of(evaluated.results)
     explained = _explained(summaries, list(marks.values()), axis)
     bottom = 0.325 + 0.175 * len(explained.splitlines())
     margins = Margins(text_width(names, 9) + 0.15, table.width + 0.1, 0.5, bottom)
     heights = [0.2 + 0.36 * len(rows[group]) for group in groups]
     figure, panels = stacked_panels(margins.left + 4.4 + margins.right, heights, margins, gap=0.36)
-    set_latency_scale(panels[-1], axis.low, axis.end, axis.logarithmic)
-    panels[-1].set_xlim(axis.low, axis.high)
+    axis.scale.set(panels[-1], "x")
+    panels[-1].set_xlim(axis.scale.low, axis.high)
     counts = {(item.detector, item.group): _count(item) for item in evaluated.summaries}
     for axes, group in zip(panels, groups, strict=True):
         _draw_group(axes, rows[group], marks, axis)
-        axes.set_title(label(group, 60), loc="left", fontweight="bold", y=1.0)
+        axes.set_title(label(shown(group), 60), loc="left", fontweight="bold", y=1.0)
         for i, row in enumerate(rows[group]):
             free = [counts.get((row.detector, name), NOTHING) for name in impact_free]
             _write_row(table, axes, i, row, free)
@@ -131,14 +119,19 @@ def _all_marks(results: Results) -> dict[tuple[str, str], _Marks]:
     return {key: _Marks(np.sort(detected), np.sort(missed)) for key, (detected, missed) in found.items()}
 
 
-def _axis_of(marks: Sequence[_Marks]) -> _Axis:
-    detected = np.concatenate([item.detected for item in marks])
-    missed = np.concatenate([item.missed for item in marks])
-    low, end, logarithmic = latency_range(detected if len(detected) else missed)
-    if not np.any(missed > end):
-        return _Axis(low, end, end, logarithmic)
-    high = end * (end / low) ** _BEYOND if logarithmic else end + _BEYOND * (end - low)
-    return _Axis(low, end, high, logarithmic)
+def latency_axis(results: Results) -> LatencyAxis:
+    """Return the axis of all latencies; if there are none, of the times for which missed contacts were monitored."""
+    rows = results.scored_contacts
+    late = [row.latency_ms for row in rows if row.latency_ms is not None]
+    return LatencyAxis.of(np.array(late or [row.watched_ms or 0.0 for row in rows if row.outcome == "missed"]))
+
+
+def _axis_of(results: Results) -> _Axis:
+    scale = latency_axis(results)
+    low, end = scale.low, scale.high
+    if not any(row.outcome == "missed" and (row.watched_ms or 0.0) > end for row in results.scored_contacts):
+        return _Axis(scale, end)
+    return _Axis(scale, end * (end / low) ** _BEYOND if scale.logarithmic else end + _BEYOND * (end - low))
 
 
 def _draw_group(axes: Axes, rows: Sequence[Summary], marks: dict[tuple[str, str], _Marks], axis: _Axis) -> None:
@@ -149,13 +142,13 @@ def _draw_group(axes: Axes, rows: Sequence[Summary], marks: dict[tuple[str, str]
     axes.set_yticks(range(len(rows)), [label(row.detector, 28) for row in rows])
     axes.tick_params(axis="y", length=0, labelsize=9)
     axes.grid(axis="x", color="0.88", linewidth=0.6)
-    if axis.high > axis.end:
+    if axis.high > axis.scale.high:
         _name_strip(axes, np.concatenate([marks[row.detector, row.group].missed for row in rows]), axis)
 
 
 def _name_strip(axes: Axes, missed: FloatArray, axis: _Axis) -> None:
-    axes.axvline(axis.end, color="0.6", linewidth=0.7, linestyle=(0, (2, 2)), zorder=0.5)
-    beyond = missed[missed > axis.end]
+    axes.axvline(axis.scale.high, color="0.6", linewidth=0.7, linestyle=(0, (2, 2)), zorder=0.5)
+    beyond = missed[missed > axis.scale.high]
     if not len(beyond):
         return
     words = f"> {between(float(beyond.min()), float(beyond.max()))} ms"
@@ -167,16 +160,18 @@ def _draw_marks(axes: Axes, row: int, detector: str, marks: _Marks, axis: _Axis)
     look = look_of(detector)
     for times, filled in ((marks.detected, True), (marks.missed, False)):
         shown = axis.shown(_thinned(times))
-        height = row - 0.12 + 0.42 * (np.arange(len(shown)) * 0.6180339887 % 1.0 - 0.5)  # see _Axis.shown
+        height = (
+            row - 0.12 + 0.42 * (np.arange(len(shown)) * 0.6180339887 % 1.0 - 0.5)
+        )  # evenly, without random numbers
         axes.plot(
             shown,
             height,
             look.marker,
             color=look.colour,
             markerfacecolor=look.colour if filled else "white",
-            markersize=4,
-            alpha=0.7 if filled else 1.0,
-            markeredgewidth=0.0 if filled else 0.9,
+            markeredgecolor="white" if filled else look.colour,
+            markersize=4.5,
+            markeredgewidth=0.4 if filled else 0.9,
             linestyle="none",
         )
 
@@ -194,12 +189,12 @@ def _draw_median(axes: Axes, row: int, summary: Summary, axis: _Axis) -> None:
     """
     height, median, least = row + 0.28, summary.median, open_end(summary)
     if least is None and not draws_no_interval(summary) and np.isfinite(median.high):
-        ends = [axis.placed(median.low), axis.placed(median.high)]
+        ends = [axis.shown(median.low), axis.shown(median.high)]
         axes.plot(ends, [height, height], color="black", linewidth=1.4, solid_capstyle="butt", zorder=3)
     if least is not None:
         _write_open_end(axes, height, (least[0], median.value), least[1], axis)
     if np.isfinite(median.value):
-        at = axis.placed(median.value)
+        at = axis.shown(median.value)
         axes.plot(
             [at, at], [height - 0.13, height + 0.13], color="black", linewidth=2.0, solid_capstyle="butt", zorder=4
         )
@@ -207,7 +202,7 @@ def _draw_median(axes: Axes, row: int, summary: Summary, axis: _Axis) -> None:
 
 def _write_open_end(axes: Axes, height: float, ends: tuple[float, float], words: str, axis: _Axis) -> None:
     """Draw an open interval from its lower end to the median and write it there; in the right half, left of both."""
-    low, high = axis.placed(ends[0]), axis.placed(ends[1] if np.isfinite(ends[1]) else ends[0])
+    low, high = axis.shown(np.array([ends[0], ends[1] if np.isfinite(ends[1]) else ends[0]])).tolist()
     axes.plot([low, low], [height - 0.1, height + 0.1], color="black", linewidth=1.0, zorder=3)
     axes.plot([low, high], [height, height], color="black", linewidth=1.4, solid_capstyle="butt", zorder=3)
     share = axes.transAxes.inverted().transform(axes.transData.transform((high, 0.0)))[0]
@@ -218,7 +213,9 @@ def _write_open_end(axes: Axes, height: float, ends: tuple[float, float], words:
 def _write_row(table: SideTable, axes: Axes, place: int, row: Summary, impact_free: Sequence[str]) -> None:
     cells, loud = count_cells(row)
     alarmed = (not cell.startswith(("0 ", NOTHING)) for cell in impact_free)
-    table.write_row(axes, place, (with_interval(row.median), *cells, *impact_free), (False, *loud, *alarmed))
+    table.write_row(
+        axes, place, (with_interval(row.median, row.resolution_ms), *cells, *impact_free), (False, *loud, *alarmed)
+    )
 
 
 def _count(item: Summary) -> str:
@@ -227,7 +224,7 @@ def _count(item: Summary) -> str:
 
 
 def _explained(summaries: Sequence[Summary], marks: Sequence[_Marks], axis: _Axis) -> str:
-    below = axis.logarithmic and any(np.any(item.detected < FLOOR_MS) for item in marks)
+    below = axis.scale.logarithmic and any(np.any(item.detected < FLOOR_MS) for item in marks)
     missed = any(len(item.missed) for item in marks)
     lines = [f"{AXES['latency']}{f' (below {FLOOR_MS:.0f} ms drawn there)' if below else ''}"]
     lines.append(f"each mark: a contact{', open if missed, at the end of its monitoring' if missed else ''}")

@@ -10,7 +10,7 @@ import numpy as np
 from cdtool.alarms.pipeline import Detection
 from cdtool.base.arrays import BoolArray, FloatArray
 from cdtool.detectors.detection import REASONS, Alarm, Status
-from cdtool.report.plots.style import BAND, FORCE, HATCHES, LIMIT, NOT_ASSESSED, ONSET_DASHES, look_of
+from cdtool.report.plots.style import BAND, FORCE, HATCHES, LIMIT_LINE, NOT_ASSESSED, ONSET_DASHES, look_of
 from cdtool.results.traces.decimation import decimate, kept_samples
 from cdtool.results.traces.trace import Span, StatisticCurve
 
@@ -41,7 +41,7 @@ class Legend:
         colour = look_of(self._detector).colour if self._detector else "0.35"
         known: dict[str, Artist] = {
             "signal": Line2D([], [], color=colour, label="signal"),
-            "limit": Line2D([], [], color=LIMIT, linestyle=(0, (4, 2)), linewidth=1.0, label="limit"),
+            "limit": Line2D([], [], **LIMIT_LINE, label="limit"),
             "band": Patch(facecolor=BAND, edgecolor="none", label="normal band"),
             "onset": Line2D([], [], color=FORCE, linestyle=ONSET_DASHES, linewidth=1.0, label="contact onset"),
             "alarm": Line2D([], [], color=colour, linewidth=2.2, label="alarm"),
@@ -100,11 +100,23 @@ def frame_signal(axes: Axes, courses: Iterable[StatisticCurve], span: Span, head
 
 
 def draw_force(axes: Axes, time: FloatArray, force: FloatArray, span: Span, *, contact: bool) -> None:
-    """Draw the load cell (n,) over time (n,) [s]; without a contact its noise is drawn small."""
+    """Draw the load cell (n,) over time (n,) [s], to a tick beyond its peak; without a contact its noise is small."""
     axes.margins(y=0.06 if contact else 1.2)
     part = (time >= span[0]) & (time <= span[1])
     if part.any():
         axes.plot(*decimate(time[part], force[part], PIXELS), color=FORCE, linewidth=0.9)
+        if contact:
+            cover_peak(axes, float(np.nanmax(force[part], initial=0.0)))
+
+
+def cover_peak(axes: Axes, highest: float) -> None:
+    """Set the ticks of the vertical axis up to one at or beyond the highest value."""
+    from matplotlib.ticker import FixedLocator, MaxNLocator
+
+    low = axes.get_ylim()[0]
+    ticks = MaxNLocator(4, steps=[1, 2, 5, 10]).tick_values(low, highest)
+    axes.yaxis.set_major_locator(FixedLocator([tick for tick in ticks if tick >= low]))
+    axes.set_ylim(low, ticks[-1])
 
 
 def draw_trigger(axes: Axes, detections: Sequence[Detection], colour: str, legend: Legend) -> None:
@@ -193,7 +205,7 @@ def _draw_band(
     for limit in (lower, upper):
         finite = np.where(np.isfinite(limit), limit, np.nan)
         if np.isfinite(finite).any():
-            axes.plot(*decimate(time, finite, PIXELS), color=LIMIT, linestyle=(0, (4, 2)), linewidth=1.0, zorder=3)
+            axes.plot(*decimate(time, finite, PIXELS), **LIMIT_LINE, zorder=3)
             legend.add("limit")
     if not ((np.isfinite(lower) | np.isfinite(upper)) & valid).any():
         return

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from cdtool.report.number_text import NOTHING
 from cdtool.report.plots.figures import Margins, label, stacked_panels, text_width, write
-from cdtool.report.plots.style import look_of
+from cdtool.report.plots.style import line_of, look_of
+from cdtool.report.table import shown
 from cdtool.results.summary import Summary
 
 if TYPE_CHECKING:
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # Height of a line, and how far the names of detectors are moved in [points], chosen by eye.
-_ROW, _INDENT = 12.5, 12.0
+_ROW, _INDENT = 12.5, 30.0
 # A detector's name is cut to this length.
 NAME_LENGTH = 24
 
@@ -67,19 +69,17 @@ class SideTable:
     def write_key(self, axes: Axes, row: int, detector: str, cells: Sequence[str], loud: Sequence[bool]) -> None:
         """Write a row counted from the panel's upper edge: the detector's mark and name, then the cells."""
         from matplotlib.lines import Line2D
-        from matplotlib.transforms import ScaledTranslation
 
-        lift = -_ROW * (row + 0.5)
-        look, figure = look_of(detector), axes.figure
-        moved = ScaledTranslation((self.gap + 0.35 * _INDENT) / 72.0, lift / 72.0, figure.dpi_scale_trans)
+        lift, look, points = -_ROW * (row + 0.5), look_of(detector), 72.0 / axes.figure.dpi * np.asarray(axes.bbox.size)
         mark = Line2D(
-            [1.0],
-            [1.0],
-            transform=axes.transAxes + moved,
-            color=look.colour,
+            1.0 + (self.gap + np.array([0.0, 0.45, 0.9]) * _INDENT) / points[0],
+            np.full(3, 1.0 + lift / points[1]),
+            transform=axes.transAxes,
+            **line_of(look),
+            linewidth=1.5,
             marker=look.marker,
+            markevery=[1],
             markersize=5.5,
-            linestyle="none",
             clip_on=False,
         )
         axes.add_line(mark)
@@ -113,17 +113,11 @@ def keyed_panels(
     `bottom` is the margin below the panels [inch]. For use within `drawing()`.
     """
     names = [label(item.detector, NAME_LENGTH) for items in rows.values() for item in items]
-    table = SideTable((SideColumn("", 72.0 * text_width(names, 8) + 20.0, left=True), *columns))
+    table = SideTable((SideColumn("", 72.0 * text_width(names, 8) + _INDENT + 8.0, left=True), *columns))
     heights = [max(size[1], _ROW * len(items) / 72.0 + 0.1) for items in rows.values()]
     margins = Margins(0.75, table.width + 0.1, 0.5, bottom)
     figure, panels = stacked_panels(margins.left + size[0] + margins.right, heights, margins, gap=0.36)
     for axes, group in zip(panels, rows, strict=True):
-        axes.set_title(label(group, 60), loc="left", fontweight="bold", y=1.0)
+        axes.set_title(label(shown(group), 60), loc="left", fontweight="bold", y=1.0)
     table.write_headings(panels[0])
     return figure, panels, table
-
-
-def rank(median: float) -> float:
-    """Return by what rows are ordered: the median, those without any last."""
-    # A median that is not reached is before none.
-    return math.inf if math.isnan(median) else min(median, 1e12)

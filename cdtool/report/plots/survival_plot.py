@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cdtool.report.model import AXES
-from cdtool.report.number_text import number
+from cdtool.report.number_text import value_and_interval
 from cdtool.report.plots.figures import drawing, message_figure, save
-from cdtool.report.plots.latency_axis import latency_range, set_latency_scale
-from cdtool.report.plots.side_table import SideColumn, count_cells, keyed_panels, rank
-from cdtool.report.plots.style import look_of
+from cdtool.report.plots.latency_axis import LatencyAxis
+from cdtool.report.plots.side_table import SideColumn, count_cells, keyed_panels
+from cdtool.report.plots.style import line_of, look_of
 from cdtool.report.writers.base import Image, Report
 from cdtool.results.curves.survival_curves import SurvivalCurve, survival_curves
 from cdtool.results.evaluated import Evaluated
@@ -45,31 +45,30 @@ def survival_figure(evaluated: Evaluated) -> Figure:
     panels_of = {group: [item for item in curves if item.group == group] for group in groups}
     of_contacts = grouped([item for item in evaluated.summaries if item.contacts], "group")
     figure, panels, table = keyed_panels(of_contacts, _FIGURES, (4.6, 1.75), bottom=0.7)
-    low, high, logarithmic = latency_range(_times(curves))
-    high = max([high, *(item.end for item in curves)])
-    set_latency_scale(panels[-1], low, high, logarithmic)
+    scale = survival_axis(curves)
+    scale.set(panels[-1], "x")
     for axes, (group, items) in zip(panels, panels_of.items(), strict=True):
-        _draw_group(axes, items, low, high)
-        for place, row in enumerate(sorted(of_contacts[group], key=lambda row: rank(row.median.value))):
+        _draw_group(axes, items, scale)
+        for place, row in enumerate(of_contacts[group]):
             cells, loud = count_cells(row)
-            table.write_key(axes, place, row.detector, (number(row.median.value), *cells), (False, *loud))
+            median = value_and_interval(row.median, row.resolution_ms)[0]
+            table.write_key(axes, place, row.detector, (median, *cells), (False, *loud))
     panels[-1].set_xlabel(_explained(panels_of.values()), linespacing=1.4)
     return figure
 
 
-def _times(curves: Sequence[SurvivalCurve]) -> np.ndarray:
-    """Return when contacts were detected; without any detection, when monitoring ended."""
-    steps = [item.curve.times[1:][np.diff(item.curve.share) < 0.0] for item in curves]
-    times = np.concatenate(steps)
-    return times if len(times) else np.array([item.end for item in curves if item.end > 0.0])
+def survival_axis(curves: Sequence[SurvivalCurve]) -> LatencyAxis:
+    """Return the axis of the times when contacts were detected and of the ends of monitoring."""
+    times = [item.curve.times[1:][np.diff(item.curve.share) < 0.0] for item in curves]
+    return LatencyAxis.of(np.concatenate([*times, [item.end for item in curves if item.end > 0.0]]))
 
 
-def _draw_group(axes: Axes, curves: Sequence[SurvivalCurve], low: float, high: float) -> None:
+def _draw_group(axes: Axes, curves: Sequence[SurvivalCurve], scale: LatencyAxis) -> None:
     seen = [item for item in curves if item.contacts > item.not_assessable]
     for item in seen:
-        _draw_curve(axes, item, low, banded=len(seen) <= _MOST_BANDS and _enough(item))
+        _draw_curve(axes, item, scale.low, banded=len(seen) <= _MOST_BANDS and _enough(item))
     axes.set_ylim(0.0, 1.06)
-    axes.set_xlim(low, high)
+    axes.set_xlim(scale.low, scale.high)
     axes.set_yticks([0.0, 0.5, 1.0], ["0", "50 %", "100 %"])
     axes.set_ylabel("still undetected")
     axes.grid(color="0.9", linewidth=0.6)
@@ -87,7 +86,7 @@ def _draw_curve(axes: Axes, item: SurvivalCurve, low: float, *, banded: bool) ->
     # A logarithmic axis has no 0: the curve begins at its left edge.
     times = np.maximum(np.append(curve.times, item.end), low)
     share, below, above = (np.append(line, line[-1]) for line in (curve.share, curve.low, curve.high))
-    axes.step(times, share, where="post", color=look.colour, linewidth=1.4, zorder=3)
+    axes.step(times, share, where="post", **line_of(look), linewidth=1.5, zorder=3)
     if banded:
         axes.fill_between(times, below, above, step="post", color=look.colour, alpha=0.13, linewidth=0, zorder=1)
     falls = np.flatnonzero(np.diff(curve.share) < 0.0) + 1

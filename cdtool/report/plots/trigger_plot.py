@@ -8,7 +8,6 @@ from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-from cdtool.base.plain_text import counted
 from cdtool.report.model import AXES
 from cdtool.report.plots.figures import (
     Margins,
@@ -28,11 +27,18 @@ from cdtool.report.plots.panels import (
     draw_onset,
     draw_signal,
     frame_signal,
-    trigger_spans,
 )
-from cdtool.report.plots.style import look_of
+from cdtool.report.plots.style import LIMIT_LINE, look_of
+from cdtool.report.plots.trace_words import (
+    LatencyTexts,
+    rows_in_order,
+    trace_words,
+    triggers_of,
+    verdict_of,
+)
 from cdtool.report.writers.base import Image, Report
-from cdtool.results.traces.trace import ContactOutcome, Panel, Span, Trace
+from cdtool.results.results import Results
+from cdtool.results.traces.trace import Panel, Trace
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,20 +54,19 @@ _LEGEND_COLUMNS = 4
 
 
 @drawing()
-def trigger_figure(trace: Trace) -> Figure:
-    """Return the load cell with the contact's onset, below it a row per detector, the fastest first."""
-    contact = trace.shown
-    rows = sorted(trace.panels, key=lambda row: (_late(trace, row), contact is not None and _blind(trace, row)))
+def trigger_figure(trace: Trace, results: Results) -> Figure:
+    """Return the load cell with onset and force limit, below it a row per detector, the fastest first."""
+    contact, rows, texts = trace.shown, rows_in_order(trace), LatencyTexts.of(results)
     forced = len(trace.force) > 0
     heights = [0.98] * forced + [0.66] * len(rows)
-    figure, panels = stacked_panels(9.0, heights, _margins(trace, rows), gap=0.14)
+    figure, panels = stacked_panels(9.0, heights, _margins(trace, rows, texts), gap=0.14)
     legend = Legend(None)
     if forced:
         draw_force(panels[0], trace.force_time, trace.force, trace.view, contact=contact is not None)
-        panels[0].locator_params(axis="y", nbins=4)
+        _draw_limits(panels[0], trace, results, legend)
         _name(panels[0], "load cell\n[N]")
     for axes, row in zip(panels[int(forced) :], rows, strict=True):
-        _draw_row(axes, trace, row, trace.view, legend)
+        _draw_row(axes, trace, row, legend, _verdict(trace, row, texts))
     for axes in panels:
         if contact:
             draw_onset(axes, contact.start, legend)
@@ -71,15 +76,16 @@ def trigger_figure(trace: Trace) -> Figure:
         step = next((step for step in _STEPS if (trace.view[1] - trace.view[0]) / step <= 12), _STEPS[-1])
         count_from(panels[-1], contact.start, step)
     height = figure.get_figheight()
-    figure.text(0.01, 1.0 - 0.06 / height, _title(trace), fontsize=10, ha="left", va="top")
+    title = "  ·  ".join([label(trace.recording, 45), *(label(words, 35) for words in trace_words(trace))])
+    figure.text(0.01, 1.0 - 0.06 / height, title, fontsize=10, ha="left", va="top")
     figure.legend(handles=legend.handles(), loc="lower left", ncols=_LEGEND_COLUMNS, borderaxespad=0.2)
     return figure
 
 
-def _margins(trace: Trace, rows: Sequence[Panel]) -> Margins:
+def _margins(trace: Trace, rows: Sequence[Panel], texts: LatencyTexts) -> Margins:
     """Return margins for the names at the left, the verdicts at the right, and the longest possible legend."""
     names = [_row_name(trace, row) for row in rows]
-    verdicts = [_verdict(trace, row) for row in rows]
+    verdicts = [_verdict(trace, row, texts) for row in rows]
     verdict = text_width([words for words, _ in verdicts], _VERDICT_SIZE)
     # Bold letters are wider than measured.
     right = max(1.2 * verdict, text_width([detail for _, detail in verdicts], _DETAIL_SIZE))
@@ -88,63 +94,26 @@ def _margins(trace: Trace, rows: Sequence[Panel]) -> Margins:
     return Margins(left + 0.08, right + _AWAY / 72.0 + 0.1, 0.34, 0.52 + 0.18 * math.ceil(kinds / _LEGEND_COLUMNS))
 
 
-def _draw_row(axes: Axes, trace: Trace, row: Panel, span: Span, legend: Legend) -> None:
+def _draw_row(axes: Axes, trace: Trace, row: Panel, legend: Legend, outcome: tuple[str, str]) -> None:
+    span, (verdict, detail) = trace.view, outcome
     frame_signal(axes, [row.course], span, headroom=1.5)
     draw_signal(axes, row.course, row.detector, span, legend)
     axes.locator_params(axis="y", nbins=3)
     colour = look_of(row.detector).colour
-    for start, end in _triggers(trace, row, span):
+    for start, end in triggers_of(trace, row, span):
         axes.axvspan(max(start, span[0]), end, color=colour, alpha=0.25, linewidth=0, zorder=1.5)
         if span[0] <= start <= span[1]:
             axes.axvline(start, color=colour, linewidth=2.2, zorder=4)
         legend.add("trigger")
     _name(axes, _row_name(trace, row))
-    verdict, detail = _verdict(trace, row)
     side = "bottom" if detail else "center"
     write(axes, verdict, (1.0, 0.5), (_AWAY, 0), va=side, fontsize=_VERDICT_SIZE, fontweight="bold")
     write(axes, detail, (1.0, 0.5), (_AWAY, -3), va="top", fontsize=_DETAIL_SIZE)
 
 
-def _seen(trace: Trace, row: Panel) -> ContactOutcome | None:
-    return row.seen[trace.contact] if trace.contact >= 0 else None
-
-
-def _late(trace: Trace, row: Panel) -> float:
-    seen = _seen(trace, row)
-    return seen.late if seen and seen.outcome == "detected" else math.inf
-
-
-def _triggers(trace: Trace, row: Panel, span: Span) -> list[Span]:
-    """Return from when to when the trigger is on within `span` [s]: each alarm until it is re-armed.
-
-    If the contact's detection is a crossing during an earlier alarm, it begins an interval of its own.
-    """
-    held = trigger_spans(row.alarms, row.rearmed, trace.end)
-    seen = _seen(trace, row)
-    if seen and seen.outcome == "detected" and seen.alarm not in row.alarms:
-        current = next(((start, end) for start, end in held if start <= seen.alarm <= end), (seen.alarm, trace.end))
-        cut = [(start, seen.alarm) if (start, end) == current else (start, end) for start, end in held]
-        held = [*cut, (seen.alarm, current[1])]
-    return [(start, min(end, span[1])) for start, end in held if start <= span[1] and end >= span[0]]
-
-
-def _blind(trace: Trace, row: Panel) -> bool:
-    seen = _seen(trace, row)
-    return seen.outcome == "not_assessable" if seen else row.is_not_assessable
-
-
-def _verdict(trace: Trace, row: Panel) -> tuple[str, str]:
-    seen = _seen(trace, row)
-    if _blind(trace, row):
-        reason = (seen.reason if seen else "") or row.reason
-        return "not assessable", fill(label(reason, 66), 24, break_on_hyphens=False)
-    count = len(row.false_alarms)
-    false = f"{counted(count, 'false alarm')}" if count else ""
-    if seen is None:
-        return (false or "no alarm"), ""
-    if seen.outcome == "detected":
-        return f"{1e3 * seen.late:.0f} ms", false
-    return ("in progress" if seen.outcome == "in_progress" else "missed"), false
+def _verdict(trace: Trace, row: Panel, texts: LatencyTexts) -> tuple[str, str]:
+    verdict, detail = verdict_of(trace, row, texts)
+    return verdict, fill(label(detail, 66), 24, break_on_hyphens=False)
 
 
 def _row_name(trace: Trace, row: Panel) -> str:
@@ -157,16 +126,16 @@ def _name(axes: Axes, text: str) -> None:
     write(axes, text, (0.0, 0.5), (-_TICKS, 0), ha="right", va="center", fontsize=_NAME_SIZE)
 
 
-def _title(trace: Trace) -> str:
-    words = [f"{label(trace.group, 35)}  ·  {label(trace.recording, 45)}"]
-    contact = trace.shown
-    if contact is None:
-        words.append("no contact")
-    elif len(trace.contacts) > 1:
-        words.append(f"contact {trace.contact + 1} of {len(trace.contacts)}")
-    if contact and math.isfinite(contact.peak_force):
-        words.append(f"peak {contact.peak_force:.0f} N")
-    return "  ·  ".join(words)
+def _draw_limits(axes: Axes, trace: Trace, results: Results, legend: Legend) -> None:
+    """Draw the allowed forces from the shown contact on, on the side to which it presses."""
+    steps = results.provenance.get("force_profiles", {}).get(trace.group, {}).get("steps", ())
+    if not steps or trace.shown is None:
+        return
+    side = -1.0 if -trace.force.min() > trace.force.max() else 1.0
+    times = [trace.shown.start + step["from_s"] for step in steps]
+    forces = [side * step["at_most_n"] for step in steps]
+    axes.step([*times, max(trace.end, times[-1])], [*forces, forces[-1]], where="post", **LIMIT_LINE, zorder=2)
+    legend.add("limit")
 
 
 def write_triggers(report: Report, folder: Path) -> list[Image]:
@@ -178,7 +147,7 @@ def write_triggers(report: Report, folder: Path) -> list[Image]:
             trace = most_informative(of_group)
             name = f"triggers_{slug(group, taken)}.png"
             images.append(Image(name, f"{trace.recording}: all detectors", group))
-            save(trigger_figure(trace), folder / name)
+            save(trigger_figure(trace, report.evaluated.results), folder / name)
     return images
 
 

@@ -51,9 +51,10 @@ def latency_cell(row: ConditionRow, group: str) -> Cell:
     if group not in row.changed.struck:
         return empty_cell()
     changed, before, statistic = row.latency(group)
-    value, *bounds = value_and_interval(changed)
+    resolution = row.changed.struck[group].resolution_ms
+    value, *bounds = value_and_interval(changed, resolution)
     median = (" (median)",) if statistic == "median" and changed.known else ()
-    unchanged = NOTHING if before is None else number(before.value)
+    unchanged = NOTHING if before is None else number(before.value, error=resolution)
     return Cell(value, (*bounds, *median, f"; unchanged {unchanged}"), key_of(changed.value))
 
 

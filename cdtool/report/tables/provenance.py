@@ -15,6 +15,7 @@ from cdtool.results.results import Results
 _NAMES = {
     "tool_version": "cdtool version",
     "machine": "machine",
+    "simulated": "recordings simulated",
     "watched_joints": "joints monitored, of all",
     "threshold": "threshold",
     "threshold_rule": "rule of the threshold",

@@ -84,21 +84,6 @@ def recordings_table(results: Results) -> Table:
     return replace(table, marks={name: [mark[name] for mark in marks] for name in (marks[0] if marks else {})})
 
 
-def scored_table(results: Results) -> Table:
-    """Return the logs that were scored, with their hashes."""
-    fields: Fields[RecordingResult] = (
-        (Heading("recording"), lambda item: name_cell(item.recording)),
-        (Heading("group"), lambda item: name_cell(item.group)),
-        (Heading("contacts", numeric=True), lambda item: count_cell(item.contacts)),
-        (Heading("operations", numeric=True), lambda item: count_cell(item.operations)),
-        (Heading("length [s]", numeric=True), lambda item: number_cell(item.seconds)),
-        (Heading("campaign"), lambda item: Cell(item.campaign or "")),
-        (Heading("test point"), lambda item: Cell(item.point or "")),
-        (Heading("SHA-256"), lambda item: Cell(item.sha256)),
-    )
-    return tabulate("scored", "Recordings scored", fields, results.recordings, "recordings", (), most_rows(results))
-
-
 def contact_tables(results: Results) -> list[Table]:
     """Return the contacts that were missed, not assessable, or in progress at the start of their recording."""
     fields: Fields[ContactResult] = (
@@ -210,8 +195,8 @@ def _outcome_cell(part: _Outcome, recording: RecordingResult, silent: bool) -> C
 def _contact_words(contacts: Sequence[ContactResult]) -> list[str]:
     if len(contacts) <= 3:
         return [", ".join(map(_contact_word, contacts))] if contacts else []
-    latencies = [item.latency_ms for item in contacts if item.latency_ms is not None]
-    slowest = f", slowest {number(max(latencies))}" if latencies else ""
+    latencies = {item.latency_ms: item for item in contacts if item.latency_ms is not None}
+    slowest = f", slowest {number(max(latencies), error=latencies[max(latencies)].resolution_ms)}" if latencies else ""
     return [f"{len(latencies)} of {len(contacts)} detected{slowest}"]
 
 
@@ -219,7 +204,8 @@ def _contact_word(item: ContactResult) -> str:
     """Return a latency, as a range if the load cell missed the beginning of the contact, or the outcome without one."""
     if item.latency_ms is not None:
         later = later_ms(item)
-        return f"{number(item.latency_ms)} to {number(item.latency_ms + later)}" if later else number(item.latency_ms)
+        longest = f" to {number(item.latency_ms + later, error=item.resolution_ms)}" if later else ""
+        return f"{number(item.latency_ms, error=item.resolution_ms)}{longest}"
     if item.in_progress:
         return "in progress at the start"
     return "missed" if item.outcome == "missed" else NOT_ASSESSABLE

@@ -4,17 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
 from cdtool.base.plain_text import counted
 from cdtool.report.few_contacts import LatencyColumn, latency_columns, latency_interval
-from cdtool.report.number_text import NOT_ASSESSABLE, NOT_REACHED, NOTHING, missed, number, rate, with_interval
+from cdtool.report.number_text import (
+    NOT_ASSESSABLE,
+    NOT_REACHED,
+    NOTHING,
+    missed,
+    number,
+    rate,
+    spoken,
+)
 from cdtool.report.table import (
     Cell,
     Fields,
     Heading,
-    Row,
     Table,
     count_cell,
     empty_cell,
@@ -28,14 +36,15 @@ from cdtool.report.table import (
 )
 from cdtool.results.comparison import SIGNIFICANT, Comparison
 from cdtool.results.evaluated import Evaluated
-from cdtool.results.results import CalibrationResult, LimitResult, Results
+from cdtool.results.results import CalibrationResult, LimitResult, Results, grouped
 from cdtool.results.summary import Summary
 from cdtool.statistics.interval import Interval
 from cdtool.statistics.paired import holm
 
 _WORST_FIRST = ("violated", "not_assessable", "met")
-_TOO_FEW = "too few recordings to show one"
+TOO_FEW = "too few recordings to show one"
 _NONE_SHOWN = "no difference shown"
+MISSED, FALSE_ALARMS = "missed", "false alarms"
 
 
 def part_of(provenance: Mapping[str, Any], key: str) -> Mapping[str, Any]:
@@ -60,12 +69,9 @@ def limits_table(results: Results, *, met: bool) -> Table:
         (Heading("value", numeric=True), lambda item: Cell(value_of(item), key=key_of(item.value))),
         (Heading("required"), lambda item: Cell(required(item))),
         (Heading("why"), lambda item: Cell(item.reason or "")),
-        (Heading("limit"), lambda item: Cell(item.limit)),
     )
-    items = [item for item in results.limits if (item.outcome == "met") == met]
-    items.sort(key=lambda item: _WORST_FIRST.index(item.outcome))
     name, title = ("met", "Limits met") if met else ("not_met", "Limits not met")
-    return tabulate(name, title, fields, items, "limits")
+    return tabulate(name, title, fields, _limits(results, met=met), "limits")
 
 
 def value_of(limit: LimitResult) -> str:
@@ -73,6 +79,19 @@ def value_of(limit: LimitResult) -> str:
     if limit.value is None:
         return NOTHING if limit.outcome == "not_assessable" else NOT_REACHED
     return f"{limit.value:.6g}"
+
+
+def limits_in_words(results: Results) -> list[str]:
+    """Return what each limit that is not met is about, and why it is not, violated ones first."""
+    return [
+        f"{shown(item.detector)}, {shown(item.group)}, {item.figure}: {item.reason or spoken(item.outcome)}"
+        for item in _limits(results, met=False)
+    ]
+
+
+def _limits(results: Results, *, met: bool) -> list[LimitResult]:
+    items = [item for item in results.limits if (item.outcome == "met") == met]
+    return sorted(items, key=lambda item: _WORST_FIRST.index(item.outcome))
 
 
 def required(limit: LimitResult) -> str:
@@ -85,43 +104,64 @@ def required(limit: LimitResult) -> str:
     return NOTHING if least is None else f"at least {least:.6g}"
 
 
-def results_table(results: Results, items: Sequence[Summary], group: str | None = None) -> Table:
-    """Return the latencies with what they must be read with, a row per summary; of one `group` under its name.
+def results_table(items: Sequence[Summary]) -> Table:
+    """Return the results in at most six columns, a part for each group; what all of its rows share is in its heading.
 
     Columns that no row fills are left out.
     """
     fields: list[tuple[Heading, Callable[[Summary], Cell]]] = [
-        (Heading("detector"), lambda item: detector_cell(results, item.detector))
+        (Heading("detector"), lambda item: name_cell(item.detector))
     ]
-    if group is None:
-        fields.append((Heading("group", choice=True), lambda item: name_cell(item.group)))
-    fields += _of_contacts(items)
-    fields += [
-        (Heading("false alarms", numeric=True), _false_alarms),
-        (Heading("false alarms per operation", numeric=True), _per_operation),
-        (Heading("per hour", numeric=True, below=True), _per_hour),
-    ]
-    fields += _of_force(items)
-    title = "Latency, misses and false alarms by detector and group"
-    if group is not None:
-        title = shown(group) + ("" if any(item.contacts for item in items) else ": no contacts, only false alarms")
-    return tabulate("results", title, fields, items, "contacts")
-
-
-def short_results_table(items: Sequence[Summary]) -> Table:
-    """Return the results in at most seven columns, which fit a pull request; those of the force only if filled."""
-    fields: list[tuple[Heading, Callable[[Summary], Cell]]] = [
-        (Heading("group"), lambda item: name_cell(item.group)),
-        (Heading("detector"), lambda item: name_cell(item.detector)),
-        (Heading("median [ms]", numeric=True), _short_median),
-        (Heading("missed", numeric=True, choice=True), _short_missed),
-        (Heading("false alarms", numeric=True, choice=True), _short_false_alarms),
-    ]
+    if any(item.contacts for item in items):
+        fields += [
+            (Heading("median [ms]", numeric=True), lambda item: _short(item, item.median)),
+            (Heading("range [ms]", numeric=True), partial(latency_cell, "range"))
+            if "range" in latency_columns(items)
+            else (Heading("P95 [ms]", numeric=True), lambda item: _short(item, item.p95)),
+            (Heading(MISSED, numeric=True, choice=True), _short_missed),
+        ]
+    fields.append((Heading(FALSE_ALARMS, numeric=True, choice=True), _short_false_alarms))
     if any(not math.isnan(item.force_at_alarm) for item in items):
         fields.append((Heading("force at alarm [N]", numeric=True), lambda item: number_cell(item.force_at_alarm)))
-    if any(not math.isnan(item.force_failed) for item in items):
-        fields.append((Heading("force limit exceeded", numeric=True, choice=True), _force_failed))
-    return tabulate("short_results", "Results", fields, items, "contacts")
+    rows: list[list[Cell]] = []
+    parts = {}
+    for group, of_group in grouped(items, "group").items():
+        own = [[make(item) for _, make in fields] for item in of_group]
+        if len(own) > 1 and not of_group[0].contacts and all(row[1:] == own[0][1:] for row in own):
+            own = [[Cell(f"all {len(own)} detectors"), *own[0][1:]]]
+        shared = [_taken_out(own, place, field.heading) for place, (field, _) in enumerate(fields)]
+        failed = of_group[0].force_failed
+        shared += [f"; force limit exceeded by {counted(int(failed), 'contact')}"] if failed > 0.0 else []
+        parts[len(rows)] = Cell(shown(group), tuple(filter(None, shared)))
+        rows += own
+    return Table("results", "Results", [column for column, _ in fields], rows, "contacts", parts=parts)
+
+
+def _taken_out(rows: Sequence[list[Cell]], place: int, heading: str) -> str:
+    """Take out of the rows what all of them say of their counts, and return it; empty if they differ."""
+    details = {row[place].details for row in rows}
+    if heading not in (MISSED, FALSE_ALARMS) or len(details) > 1 or not any(details):
+        return ""
+    for row in rows:
+        row[place] = replace(row[place], details=())
+    return f"; {heading}{''.join(*details)}"
+
+
+def every_result_table(results: Results, items: Sequence[Summary]) -> Table:
+    """Return all latencies with what they must be read with, a row per summary.
+
+    Columns that no row fills are left out; so is a rate per hour where less than an hour was recorded.
+    """
+    fields: list[tuple[Heading, Callable[[Summary], Cell]]] = [
+        (Heading("detector"), lambda item: detector_cell(results, item.detector)),
+        (Heading("group", choice=True), lambda item: name_cell(item.group)),
+        *_of_contacts(items),
+        (Heading(FALSE_ALARMS, numeric=True), _false_alarms),
+        (Heading("false alarms per operation", numeric=True), _per_operation),
+    ]
+    if any(map(_has_hour, items)):
+        fields.append((Heading("per hour", numeric=True), _per_hour))
+    return tabulate("all_results", "All results", [*fields, *_of_force(items)], items, "contacts")
 
 
 def kinds_table(results: Results, items: Sequence[Summary]) -> Table:
@@ -140,7 +180,7 @@ def _of_contacts(items: Sequence[Summary]) -> list[tuple[Heading, Callable[[Summ
     fields: list[tuple[Heading, Callable[[Summary], Cell]]] = []
     if any(item.contacts for item in items):
         fields += [
-            *((Heading(f"{name} [ms]", numeric=True), partial(_latency, name)) for name in latency_columns(items)),
+            *((Heading(f"{name} [ms]", numeric=True), partial(latency_cell, name)) for name in latency_columns(items)),
             (Heading("contacts detected", numeric=True), _detected),
             (Heading("missed", numeric=True), _missed),
             (Heading("not assessable", numeric=True), _not_assessable),
@@ -162,7 +202,7 @@ def _of_force(items: Sequence[Summary]) -> list[tuple[Heading, Callable[[Summary
 
 def comparisons_table(evaluated: Evaluated) -> Table:
     """Return the pairs of detectors on the contacts that both could assess, as far as a difference could be shown."""
-    results, without = evaluated.results, _without_difference(evaluated.comparisons)
+    results, without = evaluated.results, without_difference(evaluated.comparisons)
     fields: Fields[tuple[Comparison, str]] = (
         (Heading("group", choice=True), lambda pair: name_cell(pair[0].group)),
         (Heading("first"), lambda pair: detector_cell(results, pair[0].first)),
@@ -175,46 +215,23 @@ def comparisons_table(evaluated: Evaluated) -> Table:
         (Heading("missed only by second", numeric=True), lambda pair: count_cell(pair[0].only_second_missed)),
         (Heading("p of misses", numeric=True), lambda pair: _p(pair[0].missed_p)),
     )
-    pairs = [pair for pair in zip(evaluated.comparisons, without, strict=True) if pair[1] != _TOO_FEW]
+    pairs = [pair for pair in zip(evaluated.comparisons, without, strict=True) if pair[1] != TOO_FEW]
     return tabulate("comparisons", "Pairs of detectors on the same contacts", fields, pairs, "contacts")
 
 
-def differences_table(evaluated: Evaluated) -> Table:
-    """Return the differences between detectors that are shown, a sentence each."""
-    columns = [Heading(name) for name in ("group", "shown", "by")]
-    columns += [Heading("contacts", numeric=True), Heading("p", numeric=True)]
-    rows = [row for item in evaluated.comparisons for row in _differences(evaluated.results, item)]
-    return Table("differences", "Comparisons", columns, rows, "contacts")
-
-
-def differences_note(evaluated: Evaluated) -> str:
-    """Return what was compared, how, and what it means where no difference is shown."""
-    comparisons = evaluated.comparisons
-    pairs = f"{counted(len(comparisons), 'pair')} of detectors on the same contacts"
-    how = f"p corrected by Holm over the tests of a group; shown: p below {SIGNIFICANT:g}"
-    none = (
-        ""
-        if any(item.faster or item.misses_less for item in comparisons)
-        else " No difference is shown; this is not a proof of none."
-    )
-    few = _without_difference(comparisons).count(_TOO_FEW)
-    if few == len(comparisons):
-        return too_few_note(evaluated)
-    too_few = f" There are {_TOO_FEW} in {few} of them; recordings of one campaign count as one." if few else ""
-    return f"{pairs}; {how}.{none}{too_few}"
-
-
-def too_few_note(evaluated: Evaluated) -> str:
-    """Return how many pairs of detectors could not have shown a difference, which are in no table; empty if none."""
-    few = _without_difference(evaluated.comparisons).count(_TOO_FEW)
-    if not few:
+def comparisons_note(evaluated: Evaluated) -> str:
+    """Return how many pairs of detectors show a difference, and how many could not have shown one; empty if none."""
+    without = without_difference(evaluated.comparisons)
+    few, pairs = without.count(TOO_FEW), counted(len(without), "pair")
+    rule = "Recordings of one campaign count as one."
+    if not without:
         return ""
-    of = "" if few == len(evaluated.comparisons) else f" {few} of"
-    pairs = counted(len(evaluated.comparisons), "pair")
-    return (
-        f"No difference can be shown between{of} {pairs} of detectors: there are too few recordings of the same "
-        "contacts. Recordings of one campaign count as one."
-    )
+    if few == len(without):
+        return (
+            f"No difference can be shown between {pairs} of detectors: too few recordings of the same contacts. {rule}"
+        )
+    words = f"A difference is shown in {without.count('')} of {pairs} of detectors"
+    return f"{words}; in {few} there are {TOO_FEW}. {rule}" if few else f"{words}."
 
 
 def calibration_table(results: Results) -> Table:
@@ -230,33 +247,32 @@ def calibration_table(results: Results) -> Table:
     return tabulate("calibration", "False-alarm budget", fields, results.calibration, "calibration")
 
 
-def _latency(column: LatencyColumn, item: Summary) -> Cell:
+def latency_cell(column: LatencyColumn, item: Summary) -> Cell:
     """Return a column of the latency; the range is sorted by its longer end."""
     if column != "range":
         interval = latency_interval(item, column)
-        return empty_cell() if interval is None else interval_cell(interval)
-    ends = dict.fromkeys((number(item.min_ms), number(item.max_ms)))
+        return empty_cell() if interval is None else interval_cell(interval, item.resolution_ms)
+    ends = dict.fromkeys(number(end, error=item.resolution_ms) for end in (item.min_ms, item.max_ms))
     return Cell(" to ".join(ends), key=key_of(item.max_ms))
 
 
-def _short_median(item: Summary) -> Cell:
-    """Return the median; its interval only if there is one."""
-    if math.isnan(item.median.low) or math.isnan(item.median.high):
-        return number_cell(item.median.value)
-    return interval_cell(item.median)
+def _short(item: Summary, interval: Interval) -> Cell:
+    """Return a latency; its interval only if there is one."""
+    if math.isnan(interval.low) or math.isnan(interval.high):
+        return number_cell(interval.value, item.resolution_ms)
+    return interval_cell(interval, item.resolution_ms)
 
 
 def _short_missed(item: Summary) -> Cell:
-    if not item.contacts:
-        return empty_cell()
-    count, *bound = missed(item.missed, item.detected + item.missed, item.missed_at_most)
-    unseen = [f"; {item.not_assessable} {NOT_ASSESSABLE}"] if item.not_assessable else []
-    tone = "bad" if item.missed else "unknown" if item.not_assessable else ""
-    return Cell(count, (*bound, *unseen), item.missed, tone)
+    cell = _missed(item)
+    unseen = (f"; {item.not_assessable} {NOT_ASSESSABLE}",) if item.not_assessable else ()
+    return replace(cell, details=(*cell.details, *unseen), tone=cell.tone or ("unknown" if unseen else ""))
 
 
 def _short_false_alarms(item: Summary) -> Cell:
-    return count_cell(item.false_alarms, "bad") if _has_exposure(item) else _false_alarms(item)
+    if not has_exposure(item):
+        return _false_alarms(item)
+    return replace(_false_alarms(item), details=(f" in {_operations(item)}", f": {at_most(item)}"))
 
 
 def _detected(item: Summary) -> Cell:
@@ -274,18 +290,23 @@ def _not_assessable(item: Summary) -> Cell:
 
 def _false_alarms(item: Summary) -> Cell:
     """Return the count with its exposure; without any exposure no number but words."""
-    operations = counted(item.operations, "operation")
-    if not _has_exposure(item):
-        nowhere = (" in any of", f" {operations}")
-        return Cell(NOT_ASSESSABLE, nowhere, key_of(None), "unknown") if item.operations else empty_cell()
-    part = item.judged_operations < item.operations
-    within = (f" in {item.judged_operations} of", f" {operations}") if part else (f" in {operations}",)
-    return Cell(
-        str(item.false_alarms),
-        (*within, f", {number(item.hours)} h"),
-        item.false_alarms,
-        "bad" if item.false_alarms else "",
-    )
+    if not has_exposure(item):
+        nowhere = f" in any of {counted(item.operations, 'operation')}"
+        return Cell(NOT_ASSESSABLE, (nowhere,), key_of(None), "unknown") if item.operations else empty_cell()
+    within = (f" in {_operations(item)}", f", {number(item.hours)} h")
+    return Cell(str(item.false_alarms), within, item.false_alarms, "bad" if item.false_alarms else "")
+
+
+def _operations(item: Summary) -> str:
+    """Return the operations in which an alarm would have counted."""
+    of_all = f"{item.judged_operations} of " if item.judged_operations < item.operations else ""
+    return of_all + counted(item.operations, "operation")
+
+
+def at_most(item: Summary) -> str:
+    """Return the bound of the rate of false alarms; that per hour only where at least an hour was recorded."""
+    per_hour = f", {number(item.at_most_per_hour)} per hour" if _has_hour(item) else ""
+    return f"at most {number(item.at_most_per_operation)} per operation{per_hour}"
 
 
 def _per_operation(item: Summary) -> Cell:
@@ -293,18 +314,23 @@ def _per_operation(item: Summary) -> Cell:
 
 
 def _per_hour(item: Summary) -> Cell:
-    return _rate(item, item.false_alarms_per_hour, item.at_most_per_hour)
+    return _rate(item, item.false_alarms_per_hour, item.at_most_per_hour) if _has_hour(item) else empty_cell()
 
 
 def _rate(item: Summary, interval: Interval, at_most: float) -> Cell:
-    if not _has_exposure(item):
+    if not has_exposure(item):
         return empty_cell()
     text, *details = rate(item.false_alarms, interval, at_most)
     return Cell(text, tuple(details), key_of(interval.value))
 
 
-def _has_exposure(item: Summary) -> bool:
+def has_exposure(item: Summary) -> bool:
+    """Return whether an alarm would have counted anywhere: otherwise their absence means nothing."""
     return item.watched and item.judged_operations > 0
+
+
+def _has_hour(item: Summary) -> bool:
+    return item.hours >= 1.0
 
 
 def _force_at_alarm(item: Summary) -> Cell:
@@ -325,36 +351,18 @@ def _difference_cell(item: Comparison, without: str) -> Cell:
     return Cell("; ".join(words) or without, tone="" if words else "unknown")
 
 
-def _differences(results: Results, item: Comparison) -> list[Row]:
-    rows: list[Row] = []
-    names = {name: detector_cell(results, name).line for name in (item.first, item.second)}
-    other = {item.first: names[item.second], item.second: names[item.first]}
-    if item.faster:
-        mean = item.latency.mean
-        gain = Interval(-mean.value, -mean.high, -mean.low, mean.level) if item.faster == item.first else mean
-        words = f"{names[item.faster]} is faster than {other[item.faster]}"
-        by = Cell(f"{with_interval(gain)} ms")
-        rows.append((name_cell(item.group), Cell(words), by, count_cell(item.latency.n), _p(item.latency_p)))
-    if item.misses_less:
-        words = f"{names[item.misses_less]} misses fewer contacts than {other[item.misses_less]}"
-        fewer, more = sorted((item.only_first_missed, item.only_second_missed))
-        by = Cell(f"missed by only one: {fewer} to {more}")
-        rows.append((name_cell(item.group), Cell(words), by, count_cell(item.contacts), _p(item.missed_p)))
-    return rows
-
-
 def _p(value: float) -> Cell:
     return Cell(NOTHING if math.isnan(value) else f"{value:.2g}", key=key_of(value))
 
 
-def _without_difference(comparisons: Sequence[Comparison]) -> list[str]:
+def without_difference(comparisons: Sequence[Comparison]) -> list[str]:
     """Return for each pair why it shows no difference: there are too few recordings, or none is shown; else ""."""
     too_few: dict[int, bool] = {}
     for group in dict.fromkeys(item.group for item in comparisons):
         places = [i for i, item in enumerate(comparisons) if item.group == group]
         too_few |= dict(zip(places, _too_few([comparisons[i] for i in places]), strict=True))
     return [
-        "" if item.faster or item.misses_less else _TOO_FEW if too_few[i] else _NONE_SHOWN
+        "" if item.faster or item.misses_less else TOO_FEW if too_few[i] else _NONE_SHOWN
         for i, item in enumerate(comparisons)
     ]
 

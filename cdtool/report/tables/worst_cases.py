@@ -40,6 +40,7 @@ class _Case:
     contact: int | None = None
     at_s: float | None = None
     latency_ms: float | None = None
+    resolution_ms: float | None = None
     peak_n: float | None = None
     why: str = ""
     missed_by_all: bool = False
@@ -80,7 +81,7 @@ def worst_cases_table(results: Results, traced: Collection[Log]) -> tuple[Table,
         (Heading("outcome", choice=True), lambda item: Cell(item.outcome, tone=item.tone)),
         (Heading("contact", numeric=True), _number_of),
         (Heading("at [s]", numeric=True), _time_of),
-        (Heading("latency [ms]", numeric=True), lambda item: number_cell(item.latency_ms)),
+        (Heading("latency [ms]", numeric=True), lambda item: number_cell(item.latency_ms, item.resolution_ms)),
         (Heading("peak force [N]", numeric=True), lambda item: number_cell(item.peak_n)),
         (Heading("why"), lambda item: Cell(item.why or NOTHING)),
     )
@@ -140,6 +141,7 @@ def _of_contact(item: ContactResult, missed_by_all: bool) -> _Case:
         contact=item.contact,
         at_s=item.onset_s,
         latency_ms=item.latency_ms,
+        resolution_ms=item.resolution_ms,
         peak_n=item.peak_force_n,
         why=why,
         missed_by_all=missed_by_all,

@@ -42,7 +42,7 @@ class Report:
 
 
 class Writer(Generic[Content]):
-    """The base class of writers, of a `Report`, of a `BuildComparison` or of a `ProtocolReport`.
+    """The base class of writers, of a `Report`, of a `BuildComparison` or of a protocol's `Document`.
 
     `name` is the name it is registered under. `subject`: what it writes, the reports of a benchmark, the comparison of
     two builds or a test protocol. `needs`: the library of an extra without which it cannot write. `suffixes`: of the

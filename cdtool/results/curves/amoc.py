@@ -7,6 +7,7 @@ No false alarm does not mean a rate of zero: the upper bound is given as well.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
@@ -62,8 +63,8 @@ def amoc_curves(results: Results) -> tuple[AmocCurve, ...]:
     Returns
     -------
     tuple of AmocCurve
-        In the order of the benchmark file. Rates are per hour, or per operation if that is the unit of the false-alarm
-        budget. A detector that was nowhere assessable in the hold-out has no curve.
+        In the order of the benchmark file. Rates have the unit of the false-alarm budget, else of hours if one
+        was recorded, else of operations. A detector that was nowhere assessable in the hold-out has no curve.
 
     Examples
     --------
@@ -72,18 +73,18 @@ def amoc_curves(results: Results) -> tuple[AmocCurve, ...]:
     rows: dict[tuple[str, str], list[SweepResult]] = {}
     for row in results.sweep:
         rows.setdefault((row.group, row.detector), []).append(row)
-    per = rate_unit(results)
+    per = _rate_unit(results)
     made = [_curve(items, per) for items in rows.values()]
     return tuple(curve for curve in made if curve is not None)
 
 
-def rate_unit(results: Results) -> Per:
-    """Return the unit of false-alarm rates: that of the budget, else hours."""
+def _rate_unit(results: Results) -> Per:
+    """Return the unit of false-alarm rates: that of the budget, else hours if one was recorded, else operations."""
     budget = results.provenance.get("false_alarm_budget")
-    try:
-        return Budget.parse(str(budget)).per if budget else "hour"
-    except UsageError:
-        return "hour"
+    if budget:
+        with suppress(UsageError):
+            return Budget.parse(str(budget)).per
+    return "hour" if any(row.hours >= 1.0 for row in results.sweep) else "operation"
 
 
 def _curve(rows: Sequence[SweepResult], per: Per) -> AmocCurve | None:

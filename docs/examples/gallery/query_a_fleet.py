@@ -10,6 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 import cdtool
+from cdtool.report.plots.style import look_of
 
 results = {}
 for number, door in enumerate(("door-1", "door-2", "door-3"), 1):
@@ -29,7 +30,8 @@ medians = contacts.pivot_table("at_worst_ms", ["group", "door"], "detector", agg
 medians
 
 # %%
-axes = medians.loc["stiff"].plot.bar(rot=0, ylabel="median latency [ms]", figsize=(6, 3))
+colours = {name: look_of(name).colour for name in medians}
+axes = medians.loc["stiff"].plot.bar(rot=0, ylabel="median latency [ms]", ylim=(0, 200), color=colours, figsize=(6, 3))
 axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 # %% [markdown]

@@ -33,8 +33,9 @@ sweep = pd.DataFrame(swept).T.rename_axis("bandwidth [rad/s]")
 sweep
 
 # %%
-axes = sweep.plot(marker="o", ylabel="median latency [ms]", figsize=(7, 3))
-axes.set_ylim(bottom=0)
+axes = sweep.plot(style=["o-", "s--"], ylabel="median latency [ms]", ylim=(0, 120), logx=True, figsize=(7, 3))
+axes.set_xticks(sweep.index, [f"{bandwidth:.0f}" for bandwidth in sweep.index])
+axes.minorticks_off()
 
 # %% [markdown]
 # Above 40 rad/s the soft contacts are detected hardly any sooner: the learned band widens with the noise. Eight

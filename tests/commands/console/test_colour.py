@@ -64,11 +64,11 @@ def test_missed_contacts_and_false_alarms_are_red_and_not_assessable_ones_yellow
     assert lines[0].startswith(RED) and "limits not met" in lines[0]
     assert all("limit violated" in line for line in lines if line.startswith((f"{RED}limit ", f"{RED}  limit ")))
     stiff = next(line for line in lines if line.startswith("stiff") and "slow" in line)
-    assert re.search("\x1b\\[1;31m +1\x1b", stiff) and re.search("\x1b\\[33m +1\x1b", stiff)
+    assert f"{RED}\x1b[1m1 of 11\x1b" in stiff and "\x1b[33m\x1b[22m1 of 12\x1b" in stiff
     quick = next(line for line in lines if line.startswith("stiff") and "quick" in line)
     assert "\x1b" not in quick, "zeros have no colour"
     free = next(line for line in lines if line.startswith("holdout") and "slow" in line)
-    assert re.search("\x1b\\[1;31m +1\x1b", free)
+    assert f"{RED}\x1b[1m1 in " in free
 
 
 def test_colours_repeat_what_the_words_say(terminal, capsys, monkeypatch):
@@ -101,22 +101,29 @@ def shown(capsys: pytest.CaptureFixture[str], latencies: Mapping[str, Sequence[f
 
 def test_four_contacts_show_median_and_range_and_no_mean(capsys):
     lines = shown(capsys, {"momentum": [25.0, 27.0, 28.0, 28.5]})
-    assert "stiff momentum 27.5 25 to 28.5 4 0 0 0 4" in lines
+    assert "stiff momentum 27.5 25.0 to 28.5 0 of 4 0 in 4" in lines
     assert not any("mean ms" in line or "P95 ms" in line for line in lines[:2])
-    assert any(line.startswith("Fewer than 10 contacts detected: median and range") for line in lines)
+    assert lines[-2].startswith("0 of 4 missed: up to 53 %")
+    assert lines[-1] == "Fewer than 10 contacts detected: median and range, no mean, std or P95"
+
+
+def test_groups_without_a_miss_have_one_line_of_bounds_with_the_fewest_and_the_most_contacts(capsys):
+    many = {name: [25.0] * count for name, count in (("momentum", 4), ("direct", 8), ("energy", 12))}
+    (line,) = [line for line in shown(capsys, many) if "missed: up to" in line]
+    assert line == "0 of 4 missed: up to 53 %; 0 of 12 missed: up to 22 % (95 %)"
 
 
 def test_a_missed_contact_counts_as_later_than_the_range(capsys):
     lines = shown(capsys, {"momentum": [25.0, 27.0, 28.0, None], "direct": [None, None]})
-    assert "stiff momentum 27.5 25 to not reached 3 1 0 0 4" in lines
-    assert "stiff direct not reached not reached 0 2 0 0 4" in lines
+    assert "stiff momentum 27.5 25.0 to not reached 1 of 4 0 in 4" in lines
+    assert "stiff direct not reached not reached 2 of 2 0 in 4" in lines
 
 
 def test_ten_contacts_show_the_mean_with_its_interval_next_to_a_small_group(capsys):
     lines = shown(capsys, {"momentum": [25.0 + i for i in range(10)], "direct": [25.0, 27.0]})
     many = next(line for line in lines if line.startswith("stiff momentum"))
-    assert many.startswith("stiff momentum 29.5 (") and "25 to 34" in many
-    assert "stiff direct - - 26 25 to 27 - 2 0 0 0 4" in lines
+    assert many.startswith("stiff momentum 29.5 (") and "25.0 to 34.0" in many
+    assert "stiff direct - - 26.0 25.0 to 27.0 - 0 of 2 0 in 4" in lines
     alone = shown(capsys, {"momentum": [25.0 + i for i in range(10)]})
     assert not any("range" in line and "ms" in line for line in alone[:2])
     assert not any(line.startswith("Fewer than 10") for line in alone)

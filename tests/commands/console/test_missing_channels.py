@@ -47,7 +47,7 @@ def test_other_detectors_run_and_its_contacts_are_not_assessable(folder):
         (item["group"], item["detector"]): (item["hours"], item["not_assessable"]) for item in results["exposure"]
     }
     assert watched["holdout", "pure_inertia"] == (0.0, 1) and watched["holdout", "momentum"][0] > 0.0
-    assert re.search(r"stiff +pure_inertia +- +- +0 +- +1 +- +1", done.out)
+    assert re.search(r"stiff +pure_inertia +- +- +- +1 of 1 +-", done.out)
     assert "1 not assessable" in (folder / "r.md").read_text(encoding="utf-8")
 
 

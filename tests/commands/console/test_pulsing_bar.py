@@ -8,6 +8,7 @@ from time import sleep
 
 import pytest
 
+from cdtool.commands.console import streams
 from cdtool.commands.console.console import progress
 from cdtool.commands.convert.converting import convert
 from cdtool.commands.convert.recovering import recover
@@ -43,10 +44,14 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> Terminal:
     return made
 
 
-def test_nothing_is_drawn_without_a_terminal(capsys):
+def test_without_a_terminal_there_is_at_most_a_line_per_minute(capsys, monkeypatch):
+    clock = iter([0.0, 59.0, 61.0, 70.0, 122.0])
+    monkeypatch.setattr(streams, "monotonic", lambda: next(clock))
     with progress("converting", pulses=True) as advance:
-        assert advance is None
-    assert capsys.readouterr().err == ""
+        assert advance is not None
+        for done in range(1, 5):
+            advance(done, 4)
+    assert capsys.readouterr().err == "converting: 2 of 4\nconverting: 4 of 4\n"
 
 
 def test_a_bar_appears_and_disappears_at_the_end(monkeypatch):

@@ -32,8 +32,8 @@ def test_quiet_compare_prints_the_verdict_and_what_is_worse_without_the_table(tm
     assert whole.status == quiet.status == 1
     assert _HEADINGS.search(whole.out) and not _HEADINGS.search(quiet.out)
     lines = quiet.out.splitlines()
-    assert lines[-1] == whole.out.splitlines()[-1] and "worse" in lines[-1]
-    assert len(lines) < 0.5 * len(whole.out.splitlines()) and any("slower by" in line for line in lines[:-1])
+    assert lines[0] == whole.out.splitlines()[0] and "worse" in lines[0]
+    assert len(lines) < 0.5 * len(whole.out.splitlines()) and any("slower by" in line for line in lines[1:])
 
 
 def test_quiet_detect_counts_verdicts_and_contacts(gate_folder, feekf_signature):

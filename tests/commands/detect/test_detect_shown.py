@@ -11,6 +11,7 @@ from cdtool.alarms.activation import Activation
 from cdtool.alarms.pipeline import judge_alone
 from cdtool.commands.detect.shown import as_rows, show_detected
 from cdtool.commands.detecting.detection import Detected
+from cdtool.commands.judging.judged_operation import Judged, contact_rows
 from cdtool.detectors.detection import Signal
 from cdtool.recordings.operations import operations_of
 from cdtool.recordings.recording import Recording, Series
@@ -40,7 +41,8 @@ def detected(bursts: Sequence[tuple[int, float, float]], pressed: float = 0.4) -
     contacts = tuple(find_contacts(recording, OnsetRule(above=20.0, back_to=8.0)))
     assert len(contacts) == 1
     matching = match(detection.verdict, contacts, detection.statistic)
-    return Detected(recording, (detection,), contacts, (matching,), "limit 40 N m set by hand", contact_rows=((),))
+    rows = contact_rows(Judged("", operation, contacts, (detection,), (matching,)), recording, contacts, {}, 0.0)
+    return Detected(recording, (detection,), contacts, (matching,), "limit 40 N m", contact_rows=(tuple(rows),))
 
 
 def whys(found: Detected, capsys: pytest.CaptureFixture[str]) -> list[str]:

@@ -55,7 +55,7 @@ def test_a_detected_contact_is_explained_with_joint_limit_margins_and_first_move
         assert margin == pytest.approx(limit - signal, abs=1.1)  # both are printed with four digits
         assert (margin < 0.0) == (share > 100.0)
     assert max(map(len, done.out.splitlines())) <= 100
-    assert f"plot written to {plot}" in done.out and plot.read_text().count("<svg") == 1
+    assert f"written: {plot}" in done.out and plot.read_text().count("<svg") == 1
 
 
 def test_a_missed_contact_is_explained_with_its_closest_approach(explain):

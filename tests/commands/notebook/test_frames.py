@@ -12,7 +12,7 @@ import pytest
 
 import cdtool
 from cdtool.base.errors import UsageError
-from cdtool.report.tables.results import short_results_table
+from cdtool.report.tables.results import results_table
 from cdtool.results.evaluated import evaluate
 from cdtool.results.results import Results, tables
 from cdtool.results.summary import FIGURES
@@ -62,7 +62,7 @@ def test_few_contacts_have_median_and_range_and_no_mean_as_in_the_reports(result
     assert row[["median_ms", "min_ms", "max_ms"]].notna().all() and row[["mean_ms", "p95_ms"]].isna().all()
     every = result.summary(every=True)
     assert set(FIGURES) <= set(every) and every.columns[: len(row)].tolist() == row.index.tolist()
-    table = short_results_table(result.evaluated.summaries)
+    table = results_table(result.evaluated.summaries)
     assert all(cell.line in result._repr_html_() for line in table.rows for cell in line)
 
 

@@ -28,7 +28,7 @@ def test_a_test_at_half_the_speed_is_incomplete_and_names_both_speeds(tmp_path):
     protocol = made(tmp_path, steady(0.2), steady(-0.1))
     assert result(protocol) == ("incomplete", ["speed_differs"])
     assert words_of("en").reasons(protocol.verdict, "incomplete") == [
-        "edge, repetition 2 (edge/02.csv): measured speed 0.1 m/s, planned 0.2 m/s, allowed difference 10 %"
+        "edge, no. 2 (edge/02.csv): measured speed 0.100 m/s, planned 0.2 m/s, allowed difference 10 %"
     ]
 
 

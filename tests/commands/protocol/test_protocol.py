@@ -44,8 +44,8 @@ FILLED_IN = {
 
 def commands(outcome: Outcome) -> list[list[str]]:
     """Return the commands that an output names as next steps."""
-    lines = [line.strip() for line in outcome.out.splitlines()]
-    return [shlex.split(line)[1:] for line in lines if line.startswith("cdtool ")]
+    lines = [line.partition(": ") for line in outcome.out.splitlines()]
+    return [shlex.split(step)[1:] for word, _, step in lines if word in ("next", "then") and step.startswith("cdtool ")]
 
 
 def fill_in(path: Path) -> None:

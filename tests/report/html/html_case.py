@@ -171,8 +171,8 @@ def _force(named: Naming, group: str, log: str) -> ForceResult:
 
 def _steps(named: Naming) -> tuple[ForceStepResult, ...]:
     return tuple(
-        ForceStepResult(named(name), start, most, 900.0 - most, None, verdict, named("why"))
-        for (name, start, most), verdict in zip(STEPS, ("fail", "not_assessable"), strict=True)
+        ForceStepResult(named(name), start, most, 900.0 - most, budget, verdict, named("why"))
+        for (name, start, most), verdict, budget in zip(STEPS, ("fail", "not_assessable"), (12.5, None), strict=True)
     )
 
 

@@ -7,7 +7,7 @@ import hashlib
 import json
 import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from html.parser import HTMLParser
 from typing import Any
 
@@ -20,6 +20,7 @@ from cdtool.base.plain_text import plain
 from cdtool.report.html.page import to_html
 from cdtool.report.html.traces import ABOVE_ALL, ALPHABET, BELOW_ALL, MISSING, packed
 from cdtool.report.number_text import number, percent, with_interval
+from cdtool.report.table import shown
 from cdtool.report.writers.base import Report
 from cdtool.results.evaluated import Evaluated
 from cdtool.statistics.interval import Interval
@@ -35,7 +36,7 @@ TAGS = {
 ATTRIBUTES = {
     *("lang", "charset", "http-equiv", "content", "name", "id", "class", "href", "type", "hidden", "open", "title"),
     *("role", "aria-label", "tabindex", "scope", "height", "data-key", "data-table", "data-plot", "data-number"),
-    *("data-for", "data-do", "rel", "blocking"),
+    *("data-for", "data-do", "rel", "blocking", "colspan"),
 }
 
 
@@ -169,18 +170,18 @@ def test_hostile_names_are_text_and_nothing_else(page, kind):
     assert all(character.isprintable() or character == "\n" for character in text)
     assert found.data["detectors"][0]["name"] == plain(f"{hostile}quick")
     assert found.data["recordings"][0] == plain(f"{hostile}stiff/{hostile}01.csv")
-    assert found.tables["results-table"][1][0].split(" (")[0].strip() == plain(f"{hostile}quick").strip()
+    assert found.tables["results-table"][2][0].strip() == plain(f"{hostile}quick").strip()
 
 
 def test_every_value_of_the_summaries_is_in_the_table(made, page):
     evaluated, _ = made
-    rows = page.tables["results-table"][1:]
+    rows = page.tables["all-results-table"][1:]
     assert len(rows) == len(evaluated.summaries)
     for row, item in zip(rows, evaluated.summaries, strict=True):
-        assert row[0].startswith(item.detector) and row[1] == item.group
+        assert row[0].startswith(item.detector) and row[1] == shown(item.group)
         std = Interval(item.std_ms, math.nan, math.nan)
         for cell, figure in zip(row[2:6], (item.mean, std, item.median, item.p95), strict=True):
-            assert cell == with_interval(figure)
+            assert cell == with_interval(figure, item.resolution_ms)
         if item.contacts:
             assert row[6] == f"{item.detected} of {item.contacts}"
             assert row[7] == f"{item.missed} of {item.detected + item.missed} at most {percent(item.missed_at_most)}"
@@ -191,15 +192,35 @@ def test_every_value_of_the_summaries_is_in_the_table(made, page):
             assert set(row[2:9]) == {"–"}
         judged = f"in {item.judged_operations} of {item.operations} operations"
         assert row[9] == f"{item.false_alarms} {judged} {number(item.hours)} h"
-        per_operation, per_hour = row[10].split(" per hour: ")
-        assert per_operation.endswith(f"at most {number(item.at_most_per_operation)}")
-        assert per_hour.endswith(f"at most {number(item.at_most_per_hour)}")
+        assert row[10].endswith(f"at most {number(item.at_most_per_operation)}")
+
+
+def test_the_results_say_once_for_a_group_what_all_its_detectors_share(page):
+    rows = page.tables["results-table"]
+    assert rows[0] == ["detector", "median [ms]", "P95 [ms]", "missed", "false alarms", "force at alarm [N]"]
+    shared = "false alarms in 11 of 12 operations: at most 0.272 per operation"
+    assert [row for row in rows if len(row) == 1] == [
+        [f"stiff {shared}; force limit exceeded by 12 contacts"],
+        [f"soft {shared}; force limit exceeded by 12 contacts"],
+        ["holdout "],
+    ]
+    assert [row[3] for row in rows[2:4]] == ["0 of 12 at most 22 %", "1 of 11 at most 36 % 1 not assessable"]
+
+
+def test_a_page_says_that_recordings_are_simulated_only_if_their_machine_file_does(made, page):
+    evaluated, traces = case()
+    provenance = {**evaluated.results.provenance, "simulated": True}
+    text = to_html(Report(replace(evaluated, results=replace(evaluated.results, provenance=provenance)), traces))
+    assert "simulated recordings" in parsed(text).text
+    assert "simulated recordings" not in page.text
 
 
 def test_a_force_curve_has_the_verdict_of_its_contact(page):
     panel = page.data["force"][0]
     assert panel["steps"] == [[0, 400, "dynamic"], [0.75, 150, "static"]]
-    assert panel["curves"][0] == {"trace": 0, "contact": 0, "verdict": "fail", "peak": 900, "budget": 12.5}
+    curve = panel["curves"][0]
+    assert (curve["trace"], curve["verdict"], curve["budget"]) == (0, "fail", 12.5)
+    assert curve["exceeded"] == "limit exceeded after 12.5 ms"
     assert "Values to be checked against the standard." in page.text
     assert page.tables["forces-table"][1][7] == "dynamic 500 of 400 N: fail; static 750 of 150 N: not assessable"
 

@@ -66,7 +66,7 @@ def drawing_of(bench, simulated) -> Callable[[str, str], Drawing]:
             blind = (ContactOutcome("not_assessable", float("nan"), float("nan"), name),)
             panel = replace(trace.panels[0], detector=name, joint=name, unit=name, reason=name, seen=blind)
             named = replace(trace, recording=name, joints=2, panels=(panel, *trace.panels[1:]))
-            return Drawing.of(trigger_figure, named)
+            return Drawing.of(trigger_figure, named, evaluated(name).results)
         figures = {"latency": latency_figure, "survival": survival_figure, "amoc": amoc_figure}
         return Drawing.of(figures[kind], evaluated(name))
 

@@ -21,11 +21,16 @@ def of(*rows, **provenance) -> Results:
 
 
 def test_rates_are_false_alarms_per_monitored_hour():
-    (curve,) = amoc_curves(of(*swept("momentum", "stiff", lambda m: 60.0 * m, alarms, hours=0.1)))
+    (curve,) = amoc_curves(of(*swept("momentum", "stiff", lambda m: 60.0 * m, alarms, hours=2.0)))
     assert curve.per == "hour"
-    assert curve.rate(curve.points[0]) == pytest.approx(80.0)
+    assert curve.rate(curve.points[0]) == pytest.approx(4.0)
     assert curve.rate(curve.points[-1]) == 0.0
-    assert curve.at_most == pytest.approx(-math.log(0.05) / 0.1)
+    assert curve.at_most == pytest.approx(-math.log(0.05) / 2.0)
+
+
+def test_rates_are_per_operation_if_less_than_an_hour_was_recorded():
+    (curve,) = amoc_curves(of(*swept("momentum", "stiff", lambda m: 60.0 * m, alarms, operations=20, hours=0.9)))
+    assert (curve.per, curve.rate(curve.points[0])) == ("operation", pytest.approx(0.4))
 
 
 def test_the_point_in_use_has_the_factor_that_is_set():

@@ -12,7 +12,7 @@ from cdtool.base.files.strict_json import strict_json
 from cdtool.base.files.writing import write_texts
 from cdtool.commands.inject.coverage.coverage import Coverage
 from cdtool.commands.inject.coverage.coverage_map import CellKey, MapCell
-from cdtool.report.output_names import check_output_names
+from cdtool.report.outputs import check_output_names
 
 PAGE, JSON = ".html", ".json"
 _TOOL = "cdtool inject"

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from cdtool.base.plain_text import counted, digits
+from cdtool.base.plain_text import counted
 from cdtool.commands.inject.coverage.coverage import Coverage
 from cdtool.commands.inject.coverage.coverage_map import (
     CellContact,
@@ -28,14 +28,13 @@ from cdtool.commands.inject.coverage.coverage_map import (
 from cdtool.commands.inject.coverage.coverage_map import MapCell as MapCell
 from cdtool.detectors.detection import REASONS
 from cdtool.report.html.page_tables import classes, visible
-from cdtool.report.html.plots import css_colour
 from cdtool.report.html.sections_page import left_out_sections
-from cdtool.report.html.self_contained import content_policy, page_part, page_template, script_json
+from cdtool.report.html.self_contained import content_policy, page_part, page_template, script_json, style_sheet
 from cdtool.report.html.traces import HEIGHTS, trace_data
 from cdtool.report.model import AXES, NO_CERTIFICATE
-from cdtool.report.number_text import NOTHING, number, spoken
+from cdtool.report.number_text import NOTHING, number, short, spoken
 from cdtool.report.plots.latency_axis import FLOOR_MS
-from cdtool.report.plots.style import look_of
+from cdtool.report.plots.style import page_look
 from cdtool.report.table import Cell, Heading, Table, count_cell, name_cell, number_cell, tabulate
 from cdtool.results.traces.trace import Trace
 
@@ -101,7 +100,7 @@ def coverage_html(done: Coverage) -> str:
     made = done.map
     scale, numbers = _Scale.of(made), _numbers(made)
     traces = _traces(done)
-    style, script = page_part("report.css") + page_part("coverage.css"), "\n".join(page_part(name) for name in _SCRIPTS)
+    style, script = style_sheet(page_part("coverage.css")), "\n".join(page_part(name) for name in _SCRIPTS)
     missed, telling = made.missed(), made.most_telling(20)
     return page_template("coverage.html.j2").render(
         policy=content_policy(style, script),
@@ -116,7 +115,7 @@ def coverage_html(done: Coverage) -> str:
         certificate=NO_CERTIFICATE,
         maps=[_map(made, name, speed, scale, numbers) for name in made.cells for speed in made.speeds],
         steps=scale.steps,
-        positions=[_short(item) for item in made.positions],
+        positions=[short(item) for item in made.positions],
         unit=made.unit,
         missed=_missed_table(made, missed) if missed else None,
         few=len(missed) <= 12,
@@ -148,7 +147,7 @@ def _scope(done: Coverage) -> list[str]:
 
 
 def _between(values: Sequence[float]) -> str:
-    low, high = _short(min(values)), _short(max(values))
+    low, high = short(min(values)), short(max(values))
     return low if low == high else f"{low} to {high}"
 
 
@@ -219,9 +218,9 @@ def _page_cell(cell: MapCell, place: int, scale: _Scale) -> PageCell:
     if cell.missed:
         lines.append(f"{cell.missed} of {cell.assessable} missed")
     if not math.isnan(cell.latency_ms):
-        lines.append("–".join(dict.fromkeys(_rough(value) for value in cell.range_ms)))
+        lines.append("–".join(dict.fromkeys(number(value, 2) for value in cell.range_ms)))
         if cell.two_standard_errors_ms:
-            lines.append(f"± {_rough(cell.two_standard_errors_ms)}")
+            lines.append(f"± {number(cell.two_standard_errors_ms, 2)}")
     if math.isfinite(cell.force_n):
         lines.append(f"{number(cell.force_n)} N")
     if cell.not_assessable:
@@ -235,19 +234,9 @@ def _latency(cell: MapCell) -> str:
     return f"{words} ± {number(cell.two_standard_errors_ms, 2)}" if cell.two_standard_errors_ms else words
 
 
-def _rough(value: float) -> str:
-    """Return a latency [ms] as short as a cell of the map needs it."""
-    return f"{value:.0f}" if value >= 10.0 else number(value, 2)
-
-
-def _short(value: float) -> str:
-    """Return a coordinate without trailing zeros."""
-    return digits(float(f"{value:.3g}"))
-
-
 def in_n_per_mm(stiffness: float) -> str:
     """Return a stiffness [N/m] in N/mm, as a text."""
-    return _short(stiffness / 1e3)
+    return short(stiffness / 1e3)
 
 
 def _place_fields(made: CoverageMap) -> list[tuple[Heading, Any]]:
@@ -340,7 +329,7 @@ def _data(made: CoverageMap, traced: Sequence[str]) -> dict[str, Any]:
     items = [(name, key, cell) for name, cells in made.cells.items() for key, cell in cells.items()]
     worst = [(name, key) for name, key, _ in made.missed()] + [(i.detector, i.key) for i in made.most_telling(1)]
     return {
-        "detectors": [_detector(name) for name in made.cells],
+        "detectors": [{"name": visible(name), **page_look(name)} for name in made.cells],
         "heights": HEIGHTS,
         "axes": AXES,
         "reasons": REASONS,
@@ -356,14 +345,9 @@ def _data(made: CoverageMap, traced: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def _detector(name: str) -> dict[str, str]:
-    look = look_of(name)
-    return {"name": visible(name), "colour": css_colour(look.colour), "marker": look.marker}
-
-
 def _title(made: CoverageMap, name: str, key: CellKey) -> str:
     speed = "" if key.speed is None else f", {number(key.speed)} {made.speed_unit}"
-    return f"{visible(name)}: {_short(key.position)} {made.unit}, {in_n_per_mm(key.stiffness)} N/mm{speed}"
+    return f"{visible(name)}: {short(key.position)} {made.unit}, {in_n_per_mm(key.stiffness)} N/mm{speed}"
 
 
 def _words(contact: CellContact, speed_unit: str) -> list[str]:

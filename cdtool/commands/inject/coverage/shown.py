@@ -7,18 +7,18 @@ from collections.abc import Sequence
 
 from cdtool.base.plain_text import counted, digits
 from cdtool.commands.console.colour import Toned
-from cdtool.commands.console.console import number, print_line, say, table
+from cdtool.commands.console.console import number, print_line, print_skipped, say, table
 from cdtool.commands.inject.coverage.coverage import Coverage
 from cdtool.commands.inject.coverage.coverage_map import CellKey, MapCell, TellingCell
 from cdtool.commands.inject.coverage.page import coverage_counts, coverage_headline, coverage_tone, in_n_per_mm
 
 
 def show_coverage(done: Coverage, *, quiet: bool) -> None:
-    """Print the map as a table between its headline and the cells where a test would tell most; or the headline."""
+    """Print the headline and what was left out, and unless `quiet` the map and where a test would tell most."""
+    say(f"{coverage_headline(done.map)}: {coverage_counts(done.map)}", tone=coverage_tone(done.map))
+    print_skipped(done.skipped, done.findings)
     if not quiet:
         _show_table(done)
-    say(f"{coverage_headline(done.map)}: {coverage_counts(done.map)}", tone=coverage_tone(done.map))
-    if not quiet:
         _show_telling(done)
 
 

@@ -74,8 +74,8 @@ class Repetition:
     `rest` [N]: the load cell's reading before the contact, which is subtracted; `drift` [N/s]: its drift, 0 unless
     beyond doubt; `rest_error` [N]: how far the rest may be wrong because the record begins shortly before the contact.
     `losses`: what the reader of the recording could not keep, in words. `latencies_ms`: of each detector, None for a
-    contact that it missed or could not assess. `pressure`: the recorded one, if any; `speed` [m/s]: just before the
-    contact, NaN if the samples there are missing, None if no speed was logged.
+    contact that it missed or could not assess, and how fine it is. `pressure`: the recorded one, if any; `speed` [m/s]:
+    just before the contact, NaN if the samples there are missing, None if no speed was logged.
     """
 
     recording: str
@@ -86,7 +86,7 @@ class Repetition:
     rest: float
     drift: float = 0.0
     dynamic_time: float = math.nan
-    latencies_ms: Mapping[str, float | None] = field(default_factory=dict)
+    latencies_ms: Mapping[str, tuple[float | None, float | None]] = field(default_factory=dict)
     rest_error: float = 0.0
     losses: tuple[str, ...] = ()
     pressure: PressureRecord | None = None
@@ -100,11 +100,10 @@ class Repetition:
         curve: ForceTimeCurve,
         profile: ForceProfile,
         rest: tuple[float, float] = (0.0, 0.0),
-        latencies_ms: Mapping[str, float | None] | None = None,
     ) -> Repetition:
         """Return a contact of a `recording` (name and SHA-256) with its quantities; `rest` is its level and drift."""
         verdict = assess_force(curve, profile)
-        return cls(*recording, contact, curve, verdict, *rest, dynamic_time(curve, profile), latencies_ms or {})
+        return cls(*recording, contact, curve, verdict, *rest, dynamic_time(curve, profile))
 
     @property
     def sample_rate(self) -> float:

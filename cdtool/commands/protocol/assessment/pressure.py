@@ -9,7 +9,6 @@ by hand nobody knows when it was: it may be as high as the transient limit only 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -224,26 +223,3 @@ class PressureAssessment:
             return "fail"
         is_open = not self.is_known or self.time_is_unknown or (self.record is not None and not self.record.rises)
         return "not_assessable" if is_open or (self.verdict and self.verdict.outcome != "pass") else "pass"
-
-
-def highest(found: Sequence[PressureAssessment]) -> Mapping[str, float | None]:
-    """Return the largest pressures of several repetitions.
-
-    Parameters
-    ----------
-    found : sequence of PressureAssessment
-        The pressure of each repetition.
-
-    Returns
-    -------
-    mapping of str to float or None
-        The largest `peak` and the largest `late_peak` [N/cm2]; None where none is known.
-
-    Examples
-    --------
-    >>> highest([PressureAssessment(None, 0.5, entered=peak) for peak in (90.0, 110.0)])
-    {'peak': 110.0, 'late_peak': None}
-    """
-    peaks = [item.peak for item in found if item.peak is not None]
-    late = [item.late_peak for item in found if item.late_peak is not None and math.isfinite(item.late_peak)]
-    return {"peak": max(peaks, default=None), "late_peak": max(late, default=None)}

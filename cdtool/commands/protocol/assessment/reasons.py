@@ -55,30 +55,5 @@ class ProtocolVerdict:
     @property
     def outcome(self) -> Outcome:
         """Return fail if any reason fails, otherwise incomplete if there is a reason, otherwise pass."""
-        return worst([reason.outcome for reason in self.reasons])
-
-    def of(self, outcome: Outcome) -> tuple[Reason, ...]:
-        """Return the reasons that lead to an outcome."""
-        return tuple(reason for reason in self.reasons if reason.outcome == outcome)
-
-
-def worst(outcomes: list[Outcome]) -> Outcome:
-    """Return the outcome of several.
-
-    Parameters
-    ----------
-    outcomes : list of str
-        Any number of outcomes.
-
-    Returns
-    -------
-    str
-        Fail if one fails, otherwise incomplete if one is incomplete, otherwise pass, also of none.
-
-    Examples
-    --------
-    >>> worst(["pass", "incomplete"]), worst(["incomplete", "fail"]), worst([])
-    ('incomplete', 'fail', 'pass')
-    """
-    order: tuple[Outcome, ...] = ("fail", "incomplete", "pass")
-    return min(outcomes, key=order.index, default="pass")
+        order: tuple[Outcome, ...] = ("fail", "incomplete", "pass")
+        return min((reason.outcome for reason in self.reasons), key=order.index, default="pass")

@@ -10,11 +10,12 @@ Level = Literal[1, 2]
 
 @dataclass(frozen=True)
 class SectionHeading:
-    """A heading; `page_break`: it begins a new page."""
+    """A heading; `page_break`: it begins a new page. `keep`: all up to the next heading stays on one page."""
 
     text: str
     level: Level = 1
     page_break: bool = False
+    keep: bool = False
     kind: Literal["heading"] = "heading"
 
 
@@ -47,9 +48,10 @@ class Items:
 
 @dataclass(frozen=True)
 class Facts:
-    """Labels with their values."""
+    """Labels with their values, in one or more columns."""
 
     rows: tuple[tuple[str, str], ...]
+    columns: int = 1
     kind: Literal["facts"] = "facts"
 
 
@@ -57,13 +59,12 @@ class Facts:
 class HeadedTable:
     """A table with a heading row; `numeric` columns are right-aligned, `strong` rows emphasised.
 
-    `widths`: relative widths of the columns, 0 for as wide as the content. `typed`: columns of hashes or file names.
+    `typed`: columns of hashes.
     """
 
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     numeric: tuple[bool, ...]
-    widths: tuple[int, ...]
     strong: tuple[int, ...] = ()
     typed: tuple[int, ...] = ()
     kind: Literal["grid"] = "grid"
@@ -71,10 +72,9 @@ class HeadedTable:
 
 @dataclass(frozen=True)
 class CurveDrawing:
-    """A drawing of force-time curves as SVG, with its caption and a description for readers who do not see it."""
+    """A drawing of force-time curves as SVG, with a description for readers who do not see it."""
 
     svg: str
-    caption: str
     alt: str
     kind: Literal["curves"] = "curves"
 

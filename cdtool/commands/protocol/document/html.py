@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cdtool.commands.protocol.document.blocks import CurveDrawing, Document
+from cdtool.commands.protocol.document.blocks import Document
 from cdtool.report.html.self_contained import content_policy
 
 if TYPE_CHECKING:
@@ -24,13 +24,10 @@ def to_html(document: Document) -> str:
     """Return the page of a document; the same text for the same document."""
     from markupsafe import Markup
 
-    style = page_file("protocol.css")
-    return _template().render(
-        document=document,
-        policy=content_policy(style),
-        style=Markup(style),
-        images=[_data_url(block.svg) if isinstance(block, CurveDrawing) else "" for block in document.blocks],
-    )
+    number = document.page.replace("{page}", '" counter(page) "').replace("{pages}", '" counter(pages) "')
+    on_paper = f'@bottom-left {{ content: "{document.data_hash}" }} @bottom-right {{ content: "{number}" }}'
+    style = f"{page_file('protocol.css')}@page {{ {on_paper} }}"
+    return _template().render(document=document, policy=content_policy(style), style=Markup(style))
 
 
 @cache
@@ -44,7 +41,7 @@ def _template() -> Template:
     from jinja2 import Environment, StrictUndefined
 
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["breakable"] = _breakable
+    environment.filters |= {"breakable": _breakable, "data_url": _data_url}
     return environment.from_string(page_file("protocol.html.j2"))
 
 

@@ -2,40 +2,45 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 from cdtool.commands.protocol.assessment.assessment import PointAssessment, Repetition
-from cdtool.commands.protocol.assessment.pressure import PressureAssessment, as_profile, highest
+from cdtool.commands.protocol.assessment.pressure import PressureAssessment, as_profile
 from cdtool.commands.protocol.document.words import Words
 from cdtool.truth.force.limits import ForceProfile
 
 
-def pressure_columns(point: PointAssessment, words: Words) -> Iterator[tuple[str, list[str]]]:
-    """Yield name and cells of the columns: a cell per repetition, the highest value, the limit; none without values."""
+class Pressures(NamedTuple):
+    """Pressures of a point [N/cm2]: the column, the value of each repetition, the highest one, the limit."""
+
+    name: str
+    values: tuple[float | None, ...]
+    limit: float | None
+
+    @property
+    def highest(self) -> float | None:
+        """Return the highest value; None without one."""
+        return max((value for value in self.values if value is not None and math.isfinite(value)), default=None)
+
+
+def pressures_of(point: PointAssessment) -> Iterator[Pressures]:
+    """Yield the largest pressures of a point, and if they were recorded those where the quasi-static limit applies."""
     found = point.pressures
-    if not any(item.is_known for item in found):
-        return
-    most, limit = highest(found), found[0].limit
+    limit = found[0].limit if found else None
     first, quasi_static = (limit.first, limit.quasi_static) if limit else (None, None)
-    yield "pressure", _cells([*(item.peak for item in found), most["peak"]], first, words)
+    if any(item.is_known for item in found):
+        yield Pressures("pressure", tuple(item.peak for item in found), first)
     if any(item.record for item in found):
-        yield "late_pressure", _cells([*(item.late_peak for item in found), most["late_peak"]], quasi_static, words)
+        yield Pressures("late_pressure", tuple(item.late_peak for item in found), quasi_static)
 
 
-def _cells(values: list[float | None], limit: float | None, words: Words) -> list[str]:
-    if limit is None:
-        return [*map(words.value, values), ""]
-    return [*(words.beside(value, limit) for value in values), words.limit(limit)]
-
-
-def pressures_without_limit(points: Sequence[PointAssessment]) -> dict[str, list[str]]:
-    """Return the names of the points whose pressure is known and not limited, by profile."""
-    found: dict[str, list[str]] = {}
-    for point in points:
-        if point.profile and not point.profile.pressures and any(item.is_known for item in point.pressures):
-            found.setdefault(point.profile.name, []).append(point.point.name)
-    return found
+def pressures_without_limit(points: Sequence[PointAssessment]) -> list[str]:
+    """Return the names of the points whose pressure is known and not limited."""
+    free = [point for point in points if point.profile and not point.profile.pressures]
+    return [point.point.name for point in free if any(item.is_known for item in point.pressures)]
 
 
 def pressure_deviations(points: tuple[PointAssessment, ...], words: Words) -> Iterator[tuple[str, str]]:
@@ -53,10 +58,13 @@ def pressure_deviations(points: tuple[PointAssessment, ...], words: Words) -> It
 def pressure_curves(point: PointAssessment) -> PointAssessment | None:
     """Return a point whose curves are the recorded pressures, with their limits; None without a record or a limit."""
     limit = point.pressures[0].limit if point.pressures else None
-    pairs = [(one, item.record) for one, item in zip(point.repetitions, point.pressures, strict=True) if item.record]
-    if point.profile is None or limit is None or not pairs:
+    repetitions = tuple(
+        replace(one, curve=item.record.curve, verdict=item.verdict)
+        for one, item in zip(point.repetitions, point.pressures, strict=True)
+        if item.record and item.verdict
+    )
+    if point.profile is None or limit is None or not repetitions:
         return None
-    repetitions = tuple(replace(one, curve=record.curve) for one, record in pairs)
     return replace(point, profile=as_profile(point.profile, limit), repetitions=repetitions)
 
 
@@ -67,7 +75,7 @@ def pressure_limit_rows(
     rows: list[tuple[object, ...]] = []
     for item in profile.pressures:
         names = [point.point.name for point in points if _applies(point, profile, item.area)]
-        rows.append((words.name("area", item.area), item.transient, item.quasi_static, ", ".join(names)))
+        rows.append((words.name("of_limits", item.area), item.transient, item.quasi_static, ", ".join(names)))
     return rows
 
 

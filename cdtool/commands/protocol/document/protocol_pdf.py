@@ -10,10 +10,10 @@ from cdtool.base.files.writing import write_bytes
 from cdtool.report.writers.base import Subject, Writer
 
 if TYPE_CHECKING:
-    from cdtool.commands.protocol.document.document import ProtocolReport
+    from cdtool.commands.protocol.document.blocks import Document
 
 
-class ProtocolPdf(Writer["ProtocolReport"]):
+class ProtocolPdf(Writer["Document"]):
     """Test protocol: PDF/A-2a, tagged, with embedded fonts; needs the extra `pdf`."""
 
     name: ClassVar[str] = "protocol_pdf"
@@ -28,8 +28,8 @@ class ProtocolPdf(Writer["ProtocolReport"]):
 
         check_typst()
 
-    def write(self, report: ProtocolReport, target: Path) -> None:
+    def write(self, report: Document, target: Path) -> None:
         """Write it; raises CdtoolError."""
         from cdtool.commands.protocol.document.pdf import to_pdf
 
-        write_bytes(target, to_pdf(report.document))
+        write_bytes(target, to_pdf(report))

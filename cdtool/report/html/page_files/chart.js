@@ -24,10 +24,10 @@ function make(parent, name, attributes = {}, words = null) {
   return element;
 }
 
-/** Give an element a detector's colour; the style sheet lightens it on a dark page. */
+/** Give an element a detector's look. */
 function tint(element, detector) {
   element.classList.add("detector");
-  element.style.setProperty("--colour", detector.colour);
+  for (const name of ["colour", "dark", "dashes"]) if (detector[name]) element.style.setProperty(`--${name}`, detector[name]);
   return element;
 }
 
@@ -137,8 +137,8 @@ function showTooltip(words, event) {
 
 /**
  * plan: `whole` and `home`: the widest and the first range; `log`; `margin`; `label`; optional `offset` and `scale` of
- * what the axis writes; draw(chart) fills `chart.layer` (clipped to the data area) and `chart.front`;
- * probe(chart, x, y) returns {x, y, words, open} for the position of the pointer, or nothing.
+ * what the axis writes, and the `ticks` of the first range; draw(chart) fills `chart.layer` (clipped to the data area)
+ * and `chart.front`; probe(chart, x, y) returns {x, y, words, open} for the position of the pointer, or nothing.
  */
 class Chart {
   constructor(svg, plan) {
@@ -233,7 +233,9 @@ class Chart {
     const { offset = 0, scale = 1 } = plan;
     const [low, high] = this.view.map((end) => (end - offset) * scale);
     const most = Math.max(2, Math.floor((this.right - plan.margin.left) / 68));
-    const ticks = plan.log ? logTicksOf(low, high, most) : ticksOf(low, high, most);
+    const isHome = plan.ticks && String(this.range) === String(this.toAxis(plan.home));
+    const free = () => (plan.log ? logTicksOf(low, high, most) : ticksOf(low, high, most));
+    const ticks = isHome ? { values: apart(plan.ticks, (tick) => this.x(tick), 34), step: 0 } : free();
     draw(front, "path", { class: "axis", d: `M${plan.margin.left} ${this.bottom}H${this.right}` });
     for (const tick of ticks.values) {
       const x = this.x(tick / scale + offset);

@@ -1,40 +1,15 @@
 // The force of single contacts over the time since their onset, with its stepped limits.
 
-/** The part of a trace's load-cell curve that belongs to one contact, turned so that it presses upward. */
-function forceCurve(trace, item) {
-  const onset = trace.contacts[item.contact].start;
-  const next = trace.contacts[item.contact + 1];
-  const from = placeOf(trace.times, onset),
-    to = next ? placeOf(trace.times, next.start) : trace.times.length;
-  const times = trace.times.subarray(from, to).map((time) => 1e3 * (time - onset));
-  const raw = trace.values.subarray(from, to);
-  const low = leastOf(raw, 0),
-    high = mostOf(raw, 0);
-  const force = -low > high ? raw.map((value) => -value) : raw;
-  return { ...item, times, force, onset, highest: Math.max(high, -low), record: trace };
-}
-
-/** When the detectors of a trace raised the alarm for one of its contacts [ms after the onset]. */
-function alarmsOf(curve) {
-  return curve.record.panels
-    .map((panel) => ({ detector: panel.detector, seen: panel.seen[curve.contact] }))
-    .filter(({ seen }) => seen && seen.outcome === "detected")
-    .map(({ detector, seen }) => ({ detector, late: 1e3 * (seen.alarm - curve.onset) }));
-}
-
-function forcePlan(data, panel, readTrace, openTrace) {
-  const curves = panel.curves
-    .map((item) => forceCurve(readTrace(item.trace), item))
-    .filter((curve) => curve.times.length > 1);
-  const worst = curves.reduce((a, b) => (b.highest > a.highest ? b : a), curves[0]);
-  const alarms = worst ? alarmsOf(worst) : [];
-  const peakAt = worst ? worst.times[worst.force.indexOf(mostOf(worst.force))] : 0;
+function forcePlan(data, panel, openTrace) {
+  const curves = panel.curves.map((item) => ({ ...item, times: unpack(item.times), force: unpack(item.force) }));
+  const [worst] = curves;
+  const peakAt = worst.times[worst.force.indexOf(mostOf(worst.force))];
   const ends = curves.map((curve) => curve.times[curve.times.length - 1]);
   const steps = panel.steps.map(([from, most, name]) => ({ from: 1e3 * from, most, name }));
   const end = 1.05 * Math.max(...ends, 1.2 * steps[steps.length - 1].from, 1);
-  const home = Math.min(end, 1.3 * Math.max(100, peakAt, ...alarms.map(({ late }) => late)));
+  const home = Math.min(end, 1.3 * Math.max(100, peakAt, ...worst.alarms.map(({ late }) => late)));
   const margin = { left: 52, right: 14, top: 22, bottom: 44 };
-  const highest = 1.1 * Math.max(...curves.map((curve) => curve.highest), 1.15 * steps[0].most);
+  const highest = endOf(Math.max(...curves.map((curve) => mostOf(curve.force)), 1.1 * steps[0].most), 5);
   const y = (force) => margin.top + (1 - Math.max(force, 0) / highest) * (panel.height - margin.top - margin.bottom);
   const limitAt = (time) => steps.filter((step) => step.from <= time).pop().most;
 
@@ -69,9 +44,8 @@ function forcePlan(data, panel, readTrace, openTrace) {
       );
       draw(chart.layer, "path", { class: curve === worst ? "worst" : "other", d: `M${points.join("L")}` });
     }
-    if (!worst) return;
     chart.layer.append(chart.layer.querySelector(".worst"));
-    for (const { detector, late } of alarms) {
+    for (const { detector, late } of worst.alarms) {
       const group = tint(draw(chart.layer, "g"), data.detectors[detector]);
       const force = valueAt(worst.times, worst.force, Math.max(late, worst.times[0]));
       draw(group, "path", {
@@ -92,7 +66,7 @@ function forcePlan(data, panel, readTrace, openTrace) {
           y: at + 15,
           "text-anchor": after ? "start" : "end",
         },
-        `exceeded after ${numberText(worst.budget)} ms`,
+        worst.exceeded,
       );
     }
   }
@@ -122,14 +96,11 @@ function forcePlan(data, panel, readTrace, openTrace) {
       }
       if (!best) return null;
       const { curve, force } = best;
-      const late = alarmsOf(curve).map(
-        (alarm) => `alarm ${data.detectors[alarm.detector].name} ${numberText(alarm.late)} ms`,
-      );
       const words = [
-        `${curve.record.recording}, contact ${curve.contact + 1}`,
+        curve.name,
         `${numberText(force)} N at ${numberText(time)} ms`,
-        `${curve.verdict.replace("_", " ")}${curve.budget === null ? "" : `: first limit exceeded after ${numberText(curve.budget)} ms`}`,
-        ...late,
+        `${curve.verdict}${curve.budget === null ? "" : `: ${curve.exceeded}`}`,
+        ...curve.alarms.map(({ detector, text }) => `alarm ${data.detectors[detector].name} ${text} ms`),
         "click: trigger plot",
       ];
       return { x, y: y(force), mark: true, words: words.join("\n"), open: () => openTrace(curve.trace) };
@@ -141,7 +112,7 @@ function forcePlan(data, panel, readTrace, openTrace) {
 function makeForceLegend(host, data, plans) {
   const worst = make(host, "span");
   draw(draw(worst, "svg", { class: "plot swatch", "aria-hidden": "true" }), "path", { class: "worst", d: "M0 6H26" });
-  make(worst, "span", {}, "highest peak");
+  make(worst, "span", {}, "worst contact");
   const others = make(host, "span");
   draw(draw(others, "svg", { class: "plot swatch", "aria-hidden": "true" }), "path", { class: "other", d: "M0 6H26" });
   make(others, "span", {}, "other contacts");

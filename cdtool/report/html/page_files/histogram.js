@@ -6,10 +6,10 @@ const BARS_BOTTOM = 80;
 /** A histogram in each detector's lane, with the median and its interval below. */
 function histogramPlan(data, panel) {
   const { edges } = panel;
-  const log = edges[0] > 0;
-  const margin = { left: 10, right: 14, top: 0, bottom: 44 };
+  const { ticks, log } = data.scales.latency;
+  const margin = { left: 10, right: 18, top: 0, bottom: 44 };
   const lane = (panel.height - margin.bottom) / panel.rows.length;
-  const whole = [log ? edges[0] / 1.05 : 0, edges[edges.length - 1] * 1.05];
+  const whole = [ticks[0], ticks[ticks.length - 1]];
   const clamp = (value) => Math.max(value, edges[0]);
 
   function drawLane(chart, row, place) {
@@ -36,6 +36,7 @@ function histogramPlan(data, panel) {
   return {
     whole,
     home: whole,
+    ticks,
     log,
     margin,
     label: data.axes.latency,

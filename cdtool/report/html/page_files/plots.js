@@ -1,6 +1,5 @@
 // Latencies, the share still undetected, and latency against false alarms: one chart per group of contacts.
 
-const FLOOR_MS = 1;
 const GOLDEN = 0.6180339887;
 const NEAR = 14;
 const MOST_BANDS = 3;
@@ -33,16 +32,15 @@ function drawMedian(chart, { median: [middle, low, high], open }, y, clamp) {
 
 /** A mark per contact in its detector's lane, with the median and its interval. */
 function latencyPlan(data, panel, openRecording) {
-  const detected = panel.rows.flatMap((row) => row.latency);
-  const all = detected.concat(panel.rows.flatMap((row) => row.watched));
-  const highest = mostOf(all, FLOOR_MS) * 1.1;
-  const lowest = Math.max(leastOf(all, highest), FLOOR_MS);
-  const log = highest > 10 * lowest;
-  const floored = log && detected.some((value) => value < FLOOR_MS);
-  const whole = [log ? lowest / 1.2 : 0, highest];
-  const margin = { left: 10, right: 14, top: 0, bottom: 44 };
+  const { ticks, log } = data.scales.latency;
+  const whole = [ticks[0], ticks[ticks.length - 1]];
+  const floored = log && panel.rows.some((row) => row.latency.some((value) => value < whole[0]));
+  const isBeyond = (value) => value > whole[1];
+  const beyond = panel.rows.some((row) => row.watched.some(isBeyond));
+  const margin = { left: 10, right: beyond ? 64 : 18, top: 0, bottom: 44 };
   const lane = (panel.height - margin.bottom) / panel.rows.length;
-  const clamp = (value) => (log ? Math.max(value, lowest) : value);
+  const clamp = (value) => Math.max(value, whole[0]);
+  const placeOfTime = (chart, value) => (isBeyond(value) ? chart.right + 36 : chart.x(clamp(value)));
   const spread = (i) => 18 * ((i * GOLDEN) % 1) - 9;
   const heightOf = (row, i) => lane * row + 46 + spread(i);
 
@@ -66,8 +64,11 @@ function latencyPlan(data, panel, openRecording) {
       outline(detector.marker, chart.x(clamp(value)), heightOf(place, i), size),
     );
     draw(group, "path", { class: "mark", d: marks.join("") });
-    const open = row.watched.map((value, i) => outline(detector.marker, chart.x(value), heightOf(place, i), 3.6));
-    draw(group, "path", { class: "open", d: open.join("") });
+    const strip = tint(draw(chart.front, "g"), detector);
+    row.watched.forEach((value, i) => {
+      const d = outline(detector.marker, placeOfTime(chart, value), heightOf(place, i), 3.6);
+      draw(isBeyond(value) ? strip : group, "path", { class: "open", d });
+    });
     drawMedian(chart, row, top + 46, clamp);
   }
 
@@ -75,7 +76,7 @@ function latencyPlan(data, panel, openRecording) {
     let best = -1,
       distance = NEAR;
     values.forEach((value, i) => {
-      const off = Math.hypot(chart.x(clamp(value)) - x, heightOf(place, i) - y);
+      const off = Math.hypot(placeOfTime(chart, value) - x, heightOf(place, i) - y);
       if (off < distance) [best, distance] = [i, off];
     });
     return { best, distance };
@@ -84,10 +85,16 @@ function latencyPlan(data, panel, openRecording) {
   return {
     whole,
     home: whole,
+    ticks,
     log,
     margin,
-    label: `${data.axes.latency}${floored ? `; below ${FLOOR_MS} ms drawn there` : ""}`,
-    draw: (chart) => panel.rows.forEach((row, place) => drawLane(chart, row, place)),
+    label: `${data.axes.latency}${floored ? `; below ${whole[0]} ms drawn there` : ""}`,
+    draw(chart) {
+      panel.rows.forEach((row, place) => drawLane(chart, row, place));
+      if (!beyond) return;
+      const at = { class: "small", x: chart.right + 36, y: chart.bottom + 16, "text-anchor": "middle" };
+      draw(chart.front, "text", at, `> ${whole[1]}`);
+    },
     probe(chart, x, y) {
       const place = Math.floor(y / lane);
       const row = panel.rows[place];
@@ -104,42 +111,51 @@ function latencyPlan(data, panel, openRecording) {
       const words = [
         data.detectors[row.detector].name,
         `${recordingName(data, recording)}, contact ${contact}`,
-        missed ? `missed: no alarm within ${numberText(value)} ms` : `${numberText(value)} ms`,
+        missed ? `missed: no alarm within ${numberText(value)} ms` : `${row.texts[i]} ms`,
       ];
       if (open) words.push("click: trigger plot");
-      return { x: chart.x(clamp(value)), y: heightOf(place, i), mark: true, words: words.join("\n"), open };
+      return { x: placeOfTime(chart, value), y: heightOf(place, i), mark: true, words: words.join("\n"), open };
     },
   };
 }
 
 /** Share of the contacts still undetected over the time since the onset: a step curve per detector. */
 function survivalPlan(data, panel, hidden) {
-  const until = Math.max(...panel.rows.map((row) => row.until), FLOOR_MS);
-  const last = Math.max(...panel.rows.map((row) => row.times[row.times.length - 1]), FLOOR_MS);
-  const margin = { left: 52, right: 14, top: 10, bottom: 44 };
+  const { ticks, log } = data.scales.survival;
+  const whole = [ticks[0], ticks[ticks.length - 1]];
+  // A logarithmic axis has no 0: the curve begins at its left edge.
+  const xOf = (chart, time) => chart.x(Math.max(time, whole[0])).toFixed(1);
+  const margin = { left: 52, right: 18, top: 10, bottom: 44 };
   const y = (share) => margin.top + (1 - share) * (panel.height - margin.top - margin.bottom);
   const stepAt = (row, time) => Math.max(placeOf(row.times, time + 1e-9) - 1, 0);
 
   function stepPath(chart, row, values) {
-    let path = `M${chart.x(row.times[0]).toFixed(1)} ${y(values[0]).toFixed(1)}`;
-    for (let i = 1; i < row.times.length; i += 1)
-      path += `H${chart.x(row.times[i]).toFixed(1)}V${y(values[i]).toFixed(1)}`;
-    return `${path}H${chart.x(row.until).toFixed(1)}`;
+    const steps = row.times.map((time, i) => `${i ? `H${xOf(chart, time)}V` : `M${xOf(chart, time)} `}${y(values[i]).toFixed(1)}`);
+    return `${steps.join("")}H${xOf(chart, row.until)}`;
   }
 
   function bandPath(chart, row) {
     const back = [];
     for (let i = row.times.length - 1; i >= 0; i -= 1) {
-      const to = i ? chart.x(row.times[i]).toFixed(1) : chart.x(row.times[0]).toFixed(1);
-      back.push(`V${y(row.low[i]).toFixed(1)}H${to}`);
+      back.push(`V${y(row.low[i]).toFixed(1)}H${xOf(chart, row.times[i])}`);
     }
     return `${stepPath(chart, row, row.high)}${back.join("")}Z`;
   }
 
+  /** At most six markers of a detector on its curve: the first and the last fall and some between. */
+  function marksOf(chart, row) {
+    const { marker } = data.detectors[row.detector];
+    const falls = row.times.map((_, i) => i).slice(1);
+    const every = Math.max(falls.length - 1, 1) / Math.min(falls.length - 1, 5);
+    const shown = falls.filter((_, i) => i === Math.round(Math.round(i / every) * every));
+    return shown.map((i) => outline(marker, Number(xOf(chart, row.times[i])), y(row.share[i]), 4));
+  }
+
   return {
-    whole: [0, until * 1.02],
-    home: [0, Math.min(until * 1.02, last * 1.15)],
-    log: false,
+    whole,
+    home: whole,
+    ticks,
+    log,
     margin,
     label: data.axes.time,
     draw(chart) {
@@ -148,7 +164,8 @@ function survivalPlan(data, panel, hidden) {
       for (const row of rows) {
         const group = tint(draw(chart.layer, "g"), data.detectors[row.detector]);
         if (rows.length <= MOST_BANDS && row.low) draw(group, "path", { class: "shade", d: bandPath(chart, row) });
-        draw(group, "path", { class: "line", d: stepPath(chart, row, row.share) });
+        draw(group, "path", { class: "line dashed", d: stepPath(chart, row, row.share) });
+        draw(group, "path", { class: "mark", d: marksOf(chart, row).join("") });
       }
     },
     probe(chart, x, pointerY) {
@@ -157,30 +174,29 @@ function survivalPlan(data, panel, hidden) {
       const words = visible(panel, hidden).map((row) => {
         const i = stepAt(row, time);
         const monitored = time <= row.until || row.share[row.share.length - 1] === 0;
-        if (!monitored) return `${data.detectors[row.detector].name}: no longer monitored`;
-        const [share, ...band] = [row.share, row.low, row.high]
-          .filter((values) => values)
-          .map((values) => numberText(100 * values[i], 2));
-        const bounds = band.length ? ` (${band.join(" to ")})` : "";
-        return `${data.detectors[row.detector].name}: ${share} %${bounds} of ${row.n}`;
+        return `${data.detectors[row.detector].name}: ${monitored ? row.words[i] : "no longer monitored"}`;
       });
-      return { x, y: pointerY, words: [`${numberText(time)} ms after the onset, undetected:`, ...words].join("\n") };
+      return { x, y: pointerY, words: [`${numberText(time)} ms after the onset:`, ...words].join("\n") };
     },
   };
 }
 
 /** Median latency against the rate of false alarms: a point per safety factor. */
 function amocPlan(data, panel, hidden, unit) {
-  const zone = 92;
-  const margin = { left: 48 + zone, right: 16, top: 34, bottom: 56 };
+  const zone = 100,
+    gap = 12;
+  const { ticks, log } = data.scales.amoc;
+  const margin = { left: 44 + zone + gap, right: 16, top: 34, bottom: 56 };
   const exposure = (row) => (unit === "hour" ? row.hours : row.operations);
   const rates = panel.rows.flatMap((row) => row.alarms.filter(Boolean).map((count) => count / exposure(row)));
   const least = Math.min(...rates, ...panel.rows.map((row) => 1 / exposure(row)));
   const range = [least / 1.4, Math.max(...rates, least * 4) * 1.4];
-  const highest =
-    1.08 * Math.max(...panel.rows.flatMap((row) => row.median.filter((value) => value !== null)), FLOOR_MS);
-  const y = (value) => margin.top + (1 - value / highest) * (panel.height - margin.top - margin.bottom);
-  const columnOf = (row) => margin.left - zone + (zone * (panel.rows.indexOf(row) + 0.5)) / panel.rows.length;
+  const [low, high] = [ticks[0], ticks[ticks.length - 1]].map(log ? Math.log : Number);
+  const y = (value) => {
+    const share = ((log ? Math.log(Math.max(value, ticks[0])) : value) - low) / (high - low);
+    return margin.top + (1 - share) * (panel.height - margin.top - margin.bottom);
+  };
+  const columnOf = (row) => margin.left - gap - zone + (zone * (panel.rows.indexOf(row) + 0.5)) / panel.rows.length;
   const xOf = (chart, row, i) => (row.alarms[i] ? chart.x(row.alarms[i] / exposure(row)) : columnOf(row));
   const yOf = (row, i) => (row.median[i] === null ? margin.top - 8 : y(row.median[i]));
   const seen = (chart, row, i) => {
@@ -195,12 +211,15 @@ function amocPlan(data, panel, hidden, unit) {
       solid = "",
       open = "",
       outside = "";
-    let down = false;
+    let down = false,
+      quiet = false;
     row.factor.forEach((_, i) => {
       const shown = seen(chart, row, i);
       const [x, at] = [xOf(chart, row, i), yOf(row, i)];
       if (shown && row.median[i] !== null) {
-        path += `${down ? "L" : "M"}${x.toFixed(1)} ${at.toFixed(1)}`;
+        // No line leads from the strip of no false alarms to a rate: there is no place between them.
+        const joined = down && quiet === !row.alarms[i];
+        path += `${joined ? "L" : "M"}${x.toFixed(1)} ${at.toFixed(1)}`;
         const mark = outline(detector.marker, x, at, i === row.chosen ? 5 : 2.4);
         if (row.missed[i]) open += mark;
         else solid += mark;
@@ -208,8 +227,9 @@ function amocPlan(data, panel, hidden, unit) {
         outside += outline("^", x, at, 3.2);
       }
       down = shown && row.median[i] !== null;
+      quiet = !row.alarms[i];
     });
-    draw(group, "path", { class: "line", d: path });
+    draw(group, "path", { class: "line dashed", d: path });
     draw(group, "path", { class: "mark", d: solid });
     draw(group, "path", { class: "open", d: open });
     draw(group, "path", { class: "open", d: outside });
@@ -222,7 +242,7 @@ function amocPlan(data, panel, hidden, unit) {
     const per = unit === "hour" ? "hour" : "operation";
     const alarms = row.alarms[i];
     const rate = alarms ? `${numberText(alarms / exposure(row))} per ${per}` : `at most ${row.none[unit]} per ${per}`;
-    const median = row.median[i] === null ? "median not reached" : `median ${numberText(row.median[i])} ms`;
+    const median = `median ${row.texts[i]}${row.median[i] === null ? "" : " ms"}`;
     const inUse = i === row.chosen ? " (in use)" : "";
     return [
       `${data.detectors[row.detector].name}, safety factor ${numberText(row.factor[i])}${inUse}`,
@@ -238,35 +258,22 @@ function amocPlan(data, panel, hidden, unit) {
     margin,
     label: `false alarms per ${unit}`,
     draw(chart) {
-      const left = margin.left - zone;
-      for (const tick of ticksOf(0, highest, 5).values) {
+      const left = margin.left - gap - zone;
+      const strip = { class: "band", x: left, y: margin.top, width: zone, height: chart.bottom - margin.top };
+      draw(chart.front, "rect", strip);
+      for (const tick of ticks) {
         const at = y(tick).toFixed(1);
-        draw(chart.front, "path", { class: "axis", d: `M${left} ${at}H${chart.right}` });
-        draw(
-          chart.front,
-          "text",
-          { class: "small", x: left - 6, y: Number(at) + 4, "text-anchor": "end" },
-          tickWords(tick, 0),
-        );
+        draw(chart.front, "path", { class: "axis", d: `M${left} ${at}h${zone}M${margin.left} ${at}H${chart.right}` });
+        const place = { class: "small", x: left - 6, y: Number(at) + 4, "text-anchor": "end" };
+        draw(chart.front, "text", place, tickWords(tick, 0));
       }
       draw(chart.front, "text", { class: "small", x: 0, y: 10 }, data.axes.median);
-      draw(chart.front, "path", { class: "axis", d: `M${left} ${chart.bottom}H${margin.left}V${margin.top}` });
       const fewest = panel.rows.reduce((a, b) => (exposure(b) < exposure(a) ? b : a));
-      const middle = margin.left - zone / 2;
       const watched = unit === "hour" ? `${numberText(fewest.hours)} h` : `${fewest.operations} operations`;
-      draw(
-        chart.front,
-        "text",
-        { class: "small", x: middle, y: chart.bottom + 16, "text-anchor": "middle" },
-        "none in",
-      );
-      draw(chart.front, "text", { class: "small", x: middle, y: chart.bottom + 30, "text-anchor": "middle" }, watched);
-      draw(
-        chart.front,
-        "text",
-        { class: "small", x: middle, y: chart.bottom + 44, "text-anchor": "middle" },
-        `(at most ${fewest.none[unit]})`,
-      );
+      ["0", `in ${watched}:`, `at most ${fewest.none[unit]}`].forEach((words, i) => {
+        const place = { class: "small", x: left + zone / 2, y: chart.bottom + 16 + 14 * i, "text-anchor": "middle" };
+        draw(chart.front, "text", place, words);
+      });
       for (const row of visible(panel, hidden)) drawCurve(chart, row);
     },
     probe(chart, x, pointerY) {

@@ -72,7 +72,7 @@ function printFailed(data, failed, most) {
       const figure = make(host, "figure");
       const part = parts.length > 1 ? `, part ${i + 1} of ${parts.length}` : "";
       make(figure, "h3", {}, `${trace.recording || "(no name)"}${part}`);
-      const words = wordsOf(trace);
+      const words = [...trace.words];
       if (leftOut) words.push(`${counted(leftOut, "other detector")} left out`);
       make(figure, "p", { class: "note" }, words.join(" · "));
       const forced = trace.times.length > 0 ? PAPER_HEIGHTS.force : 0;

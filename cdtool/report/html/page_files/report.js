@@ -17,7 +17,7 @@ function makeCharts(kind, data, panels, plan) {
 function makeAmoc(data) {
   const controls = document.querySelector('.controls[data-for="amoc"]');
   if (!controls) return;
-  let unit = "operation";
+  let unit = data.per;
   let hiddenNow = new Set();
   const charts = makeCharts("amoc", data, data.amoc, (panel, hidden) => {
     hiddenNow = hidden;
@@ -26,10 +26,7 @@ function makeAmoc(data) {
   makeChoice(
     controls,
     "False alarms",
-    [
-      ["operation", "per operation"],
-      ["hour", "per hour"],
-    ],
+    [unit, unit === "hour" ? "operation" : "hour"].map((per) => [per, `per ${per}`]),
     (chosen) => {
       unit = chosen;
       charts.forEach((chart, i) => chart.replace(amocPlan(data, data.amoc[i], hiddenNow, unit)));
@@ -40,12 +37,10 @@ function makeAmoc(data) {
 function makeForces(data, viewer) {
   const host = document.querySelector('.legend[data-for="force"]');
   if (!host || !viewer) return;
-  const plans = data.force.map((panel) => forcePlan(data, panel, viewer.traceAt, viewer.open));
+  const plans = data.force.map((panel) => forcePlan(data, panel, viewer.open));
   elements("force").forEach((svg) => new Chart(svg, plans[Number(svg.dataset.number)]));
-  const detectors = data.force.flatMap((panel) =>
-    panel.curves.flatMap((item) => viewer.traceAt(item.trace).panels.map((row) => row.detector)),
-  );
-  makeForceLegend(host, data, detectors);
+  const alarms = data.force.flatMap((panel) => panel.curves.flatMap((item) => item.alarms));
+  makeForceLegend(host, data, alarms.map(({ detector }) => detector));
 }
 
 /** Show the headings of tables as text or as buttons: on later pages a browser repeats headings without buttons. */

@@ -85,6 +85,19 @@ function ticksOf(low, high, most) {
   return { values: found, step };
 }
 
+/** The first tick at or beyond the highest value of an axis from 0 with about so many ticks. */
+function endOf(highest, most) {
+  const { step } = ticksOf(0, highest, most);
+  return Math.ceil(highest / step - 1e-9) * step;
+}
+
+/** The last and the first tick, and the others that have room between them [px]. */
+function apart(ticks, place, room) {
+  const kept = [ticks[ticks.length - 1], ticks[0]];
+  for (const tick of ticks) if (kept.every((other) => Math.abs(place(other) - place(tick)) >= room)) kept.push(tick);
+  return kept;
+}
+
 /** Round numbers for a logarithmic axis; for a short one those of a linear axis. */
 function logTicksOf(low, high, most) {
   for (const factors of [[1, 2, 3, 5, 7], [1, 2, 5], [1, 3], [1]]) {

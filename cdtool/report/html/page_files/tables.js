@@ -32,18 +32,17 @@ function makeSortable(headings, sort) {
   });
 }
 
-/** Sort a table of the page: its rows are reordered. */
+/** Sort a table of the page: its rows are reordered, each part's below its heading. */
 function sortInPlace(table) {
-  const body = table.tBodies[0];
-  const rows = [...body.rows];
+  const parts = [...table.tBodies].map((body) => [body, [...body.rows].filter((row) => row.className !== "part")]);
   makeSortable([...table.tHead.rows[0].cells], (column, direction) => {
-    const keyed = rows.some((row) => row.cells[column].dataset.key !== undefined);
+    const keyed = parts.some(([, rows]) => rows.some((row) => row.cells[column].dataset.key !== undefined));
     const key = (row) => {
       const cell = row.cells[column];
       if (!keyed) return cell.textContent;
       return cell.dataset.key === undefined ? Infinity : Number(cell.dataset.key);
     };
-    body.append(...[...rows].sort((a, b) => compareRows(key(a), key(b), direction)));
+    for (const [body, rows] of parts) body.append(...[...rows].sort((a, b) => compareRows(key(a), key(b), direction)));
   });
 }
 

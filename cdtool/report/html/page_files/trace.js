@@ -29,27 +29,6 @@ function shownContact(trace) {
   return trace.contact >= 0 ? trace.contacts[trace.contact] : null;
 }
 
-/** The text right of a row: the latency, or why it is missing. */
-function verdictOf(trace, panel) {
-  const seen = trace.contact >= 0 ? panel.seen[trace.contact] : null;
-  const extra = panel.false_alarms.length ? counted(panel.false_alarms.length, "false alarm") : "";
-  const outcome = seen ? seen.outcome : panel.verdict === "not_assessable" ? panel.verdict : "";
-  if (outcome === "not_assessable") return { words: "not assessable", reason: (seen && seen.reason) || panel.reason };
-  if (!seen) return { words: extra || "no alarm", reason: "" };
-  const words = outcome === "detected" ? `${numberText(1e3 * seen.late)} ms` : "missed";
-  return { words, reason: extra };
-}
-
-/** From when to when each alarm is raised: until it is re-armed; to the end if never or unknown. */
-function triggersOf(trace, panel) {
-  const spans = panel.alarms.map((time, i) => [time, panel.rearmed[i] ?? trace.end]);
-  const seen = trace.contact >= 0 ? panel.seen[trace.contact] : null;
-  // The contact's own crossing may be during an earlier alarm.
-  if (seen && seen.outcome === "detected" && !spans.some(([from, to]) => from <= seen.alarm && seen.alarm <= to))
-    spans.push([seen.alarm, trace.end]);
-  return spans;
-}
-
 /** Intervals of samples that are not assessable: first and last time, and the number of the reason. */
 function notAssessed(panel) {
   const found = [];
@@ -97,7 +76,7 @@ function tracePlan(data, trace) {
   const contact = shownContact(trace);
   const forced = trace.times.length > 0;
   const margin = { left: 50, right: 10, top: 0, bottom: heights.axis };
-  const rows = [...trace.panels].sort((a, b) => lateness(trace, a) - lateness(trace, b));
+  const rows = trace.panels;
   const first = forced ? heights.force : 0;
 
   /** A curve with a break where a sample is missing. */
@@ -142,11 +121,19 @@ function tracePlan(data, trace) {
   function drawForce(chart) {
     const [from, to] = part(chart, trace.times);
     const seen = trace.values.subarray(from, to).filter(Number.isFinite);
-    const most = mostOf(seen, 1),
-      least = leastOf(seen, 0);
-    const place = area(0, heights.force, least - 0.06 * (most - least), most + 0.06 * (most - least));
+    const limits = (data.force || []).find((panel) => panel.group === trace.words[0])?.steps ?? [];
+    const least = leastOf(seen, 0),
+      most = endOf(mostOf(seen, 1), 3);
+    const place = area(0, heights.force, least, most);
     draw(chart.front, "text", { class: "strong", x: 0, y: 13 }, "load cell [N]");
     levels(chart, place, least, most);
+    if (contact && limits.length) {
+      const side = -least > mostOf(seen, 0) ? -1 : 1;
+      const path = limits.map(
+        ([from, most], i) => `${i ? "H" : "M"}${chart.x(contact.start + from)}${i ? "V" : " "}${place.y(side * most)}`,
+      );
+      draw(chart.layer, "path", { class: "limit", d: `${path.join("")}H${chart.right}` });
+    }
     draw(chart.layer, "path", { class: "force", d: line(chart, trace.times, trace.values, place.y, from, to) });
   }
 
@@ -156,7 +143,7 @@ function tracePlan(data, trace) {
     const [from, to] = part(chart, panel.time);
     const [low, high] = frame(panel, from, to);
     const box = area(top, heights.row, low, high);
-    const { words, reason } = verdictOf(trace, panel);
+    const [words, reason] = panel.words;
     const joint = trace.joints > 1 ? ` · ${panel.joint}` : "";
     const letters = Math.floor(chart.width / 8) - words.length;
     draw(
@@ -238,7 +225,7 @@ function tracePlan(data, trace) {
         d: `M${chart.x(time).toFixed(1)} ${box.from}v${height}`,
       });
     }
-    for (const [from, to] of triggersOf(trace, panel)) {
+    for (const [from, to] of panel.held) {
       const left = Math.max(chart.x(from), margin.left);
       const right = Math.min(chart.x(to), chart.right);
       if (right > left) draw(group, "rect", { class: "trigger", x: left, y: box.from, width: right - left, height });
@@ -304,26 +291,6 @@ function tracePlan(data, trace) {
   };
 }
 
-function lateness(trace, panel) {
-  const seen = trace.contact >= 0 ? panel.seen[trace.contact] : null;
-  if (!seen) return 0;
-  return { detected: seen.late, missed: 1e6 }[seen.outcome] ?? 1e7;
-}
-
-/** Group, contact, peak and onset of a trace. */
-function wordsOf(trace) {
-  const contact = shownContact(trace);
-  const words = [trace.group];
-  if (!contact) words.push("no contact");
-  else if (trace.contacts.length > 1) words.push(`contact ${trace.contact + 1} of ${trace.contacts.length}`);
-  if (contact && contact.peak_force !== null) words.push(`peak ${numberText(contact.peak_force)} N`);
-  if (contact)
-    words.push(
-      `onset ${contact.start.toFixed(3)} s (${contact.found_by}, ± ${numberText(1e3 * contact.uncertainty, 2)} ms)`,
-    );
-  return words;
-}
-
 /** The panel with the trigger plot of one recording; returns open(number) to show a trace. */
 function makeViewer(data, sources, opened) {
   const viewer = document.getElementById("viewer");
@@ -351,7 +318,7 @@ function makeViewer(data, sources, opened) {
   }
 
   function tell(trace, number) {
-    const words = wordsOf(trace);
+    const words = [...trace.words];
     words.push(`plot ${number + 1} of ${sources.length}${trace.chosen ? `: ${trace.chosen}` : ""}`);
     document.getElementById("viewer-title").textContent = trace.recording || "(no name)";
     document.getElementById("viewer-words").textContent = words.join(" · ");
@@ -400,7 +367,7 @@ function makeTraceLegend(host) {
   for (const words of [
     "coloured line: signal",
     "coloured vertical line: alarm, dashed where it is false",
-    "shaded from an alarm until it is armed again: trigger on",
+    "shaded from an alarm until it is re-armed: trigger on",
   ])
     make(host, "span", {}, words);
 }

@@ -236,7 +236,6 @@ def test_no_reason_is_ever_outvoted(kinds):
     verdict = ProtocolVerdict(tuple(Reason(kind) for kind in kinds))
     assert (verdict.outcome == "pass") == (not kinds)
     assert (verdict.outcome == "fail") == bool(FAILING & set(kinds))
-    assert len(verdict.of("fail")) + len(verdict.of("incomplete")) == len(kinds)
 
 
 def good() -> list:

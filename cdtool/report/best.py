@@ -1,0 +1,132 @@
+"""Each group of a benchmark in a sentence: the best detector, its latency, and what its zeros can mean at most.
+
+Conventions: best is who has the fewest contacts missed or not assessable, then the fewest false alarms in all groups,
+then the least median as it is shown; equal ones are named together. Whether that difference is more than chance is
+known from the comparisons of pairs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from cdtool.base.plain_text import NAMED, counted
+from cdtool.report.number_text import NOT_ASSESSABLE, missed, number, value_and_interval
+from cdtool.report.table import Cell, Heading, Table, name_cell, shown
+from cdtool.report.tables.results import TOO_FEW, at_most, has_exposure, without_difference
+from cdtool.results.evaluated import Evaluated
+from cdtool.results.summary import Summary
+
+BEST = (
+    "Best: fewest contacts missed or not assessable, then fewest false alarms in all groups, then least median of the "
+    "latency from the onset to the alarm. “At most”: one-sided 95 % bound."
+)
+
+
+def best_table(evaluated: Evaluated) -> Table:
+    """Return a sentence for each group; for one without contacts it is about the false alarms."""
+    alarms = {
+        name: sum(_alarms(item) for item in evaluated.summaries if item.detector == name)
+        for name in evaluated.results.detectors
+    }
+    rows = []
+    for group in evaluated.results.groups:
+        items = [item for item in evaluated.summaries if item.group == group]
+        hit = [item for item in items if item.contacts]
+        words = _of_contacts(evaluated, hit, alarms) if hit else f"no contacts; {_of_false_alarms(items)}"
+        rows.append((name_cell(group), Cell(words)))
+    return Table("best", "Best detectors", (Heading("group"), Heading("best detector")), rows, "contacts")
+
+
+def _alarms(item: Summary) -> float:
+    """Return the false alarms; infinite if there were operations, but none in which an alarm would have counted."""
+    return math.inf if item.operations and not has_exposure(item) else item.false_alarms
+
+
+def _of_contacts(evaluated: Evaluated, items: Sequence[Summary], alarms: Mapping[str, float]) -> str:
+    if not any(item.detected for item in items):
+        return f"no detector detected a contact: {_outcomes(min(items, key=lambda item: item.not_assessable))}"
+
+    def rank(item: Summary) -> tuple[float, ...]:
+        median = math.inf if math.isnan(item.median_ms) else item.median_ms
+        return item.missed + item.not_assessable, alarms[item.detector], median
+
+    first, *others = sorted(items, key=rank)
+    alike = [item for item in others if rank(item)[:2] == rank(first)[:2]]
+    equal = [
+        first.detector,
+        *(item.detector for item in alike if _ms(item, item.median_ms) == _ms(first, first.median_ms)),
+    ]
+    words = "every detector missed contacts; " if others and all(item.missed for item in items) else ""
+    words += _named(equal) + (" are equally good" if len(equal) > 1 else " is best" if others else "")
+    count = alarms[first.detector]
+    heard = counted(int(count), "false alarm") if math.isfinite(count) else f"false alarms {NOT_ASSESSABLE}"
+    return f"{words}: median {_median(first)}, {_outcomes(first)}, {heard}{_evidence(evaluated, first, equal)}"
+
+
+def _median(item: Summary) -> str:
+    """Return the median with its interval, or with the range where contacts are too few for one."""
+    value, *ends = value_and_interval(item.median, item.resolution_ms)
+    unit = " ms" if math.isfinite(item.median_ms) else ""
+    if math.isnan(item.median.low):
+        return f"{value}{unit} (range {_ms(item, item.min_ms)} to {_ms(item, item.max_ms)})"
+    return f"{value}{unit}{''.join(ends).replace('(', '(95 %: ')}"
+
+
+def _ms(item: Summary, latency: float) -> str:
+    return number(latency, error=item.resolution_ms)
+
+
+def _outcomes(item: Summary) -> str:
+    count, *bound = missed(item.missed, item.assessable, item.missed_at_most)
+    most = f" ({bound[0].lstrip(': ')})" if bound else ""
+    unseen = f", {item.not_assessable} {NOT_ASSESSABLE}" if item.not_assessable else ""
+    return f"{count} contacts missed{most}{unseen}"
+
+
+def _evidence(evaluated: Evaluated, first: Summary, equal: Sequence[str]) -> str:
+    """Return how sure it is that the best detector is better than the others; empty without others."""
+    pairs = zip(evaluated.comparisons, without_difference(evaluated.comparisons), strict=True)
+    of_best = [
+        (pair.second if pair.first == first.detector else pair.first, pair, why)
+        for pair, why in pairs
+        if pair.group == first.group and first.detector in (pair.first, pair.second)
+    ]
+    others = {name: (pair, why) for name, pair, why in of_best if name not in equal}
+    faster = [name for name, (pair, _) in others.items() if pair.faster == name]
+    alike = {name: why for name, (_, why) in others.items() if why}
+    words = f"; {_named(faster)} faster, but with more misses or false alarms" if faster else ""
+    if set(alike.values()) == {TOO_FEW}:
+        return f"{words}; {counted(first.assessable, 'contact', 'are')} too few to show a difference"
+    if alike:
+        return f"{words}; not shown to be better than {_named(list(alike))}"
+    every = f"all {len(others)} others" if len(others) > 1 else _named(list(others))
+    return words or (f"; shown to be better than {every}" if others else "")
+
+
+def _of_false_alarms(items: Sequence[Summary]) -> str:
+    counts = [item for item in items if has_exposure(item)]
+    if not counts:
+        return f"false alarms {NOT_ASSESSABLE}" if any(item.operations for item in items) else "nothing was scored"
+    quiet = [item for item in counts if not item.false_alarms]
+    words = []
+    if quiet:
+        least = min(quiet, key=lambda item: item.judged_operations)
+        every = " of any detector" if len(items) > 1 else ""
+        who = every if len(quiet) == len(items) else f" of {_named([item.detector for item in quiet])}"
+        operations = counted(least.judged_operations, "operation")
+        words.append(f"no false alarm{who} in {operations} ({at_most(least)})")
+    loud = sorted((item for item in counts if item.false_alarms), key=lambda item: item.false_alarms)
+    words += [
+        f"{counted(item.false_alarms, 'false alarm')} of {shown(item.detector)} in "
+        f"{counted(item.judged_operations, 'operation')} ({at_most(item)})"
+        for item in loud[:NAMED]
+    ]
+    words += [f"{len(loud) - NAMED} detectors more"] if len(loud) > NAMED else []
+    return "; ".join(words)
+
+
+def _named(detectors: Sequence[str]) -> str:
+    names = [shown(name) for name in detectors[:NAMED]]
+    names += [f"{len(detectors) - NAMED} more"] if len(detectors) > NAMED else []
+    return " and ".join(filter(None, (", ".join(names[:-1]), *names[-1:])))

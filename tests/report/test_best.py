@@ -1,0 +1,83 @@
+"""The sentence of each group names the best detector by an order that cannot be talked away, and what is not known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from cdtool.report.best import best_table
+from cdtool.results.evaluated import evaluate
+from cdtool.results.results import ExposureResult, FalseAlarmResult, Results
+from tests.report.bench import contacts_of
+
+FAST, SLOW = [10.0, 11.0, 12.0, 13.0], [50.0, 51.0, 52.0, 53.0]
+MANY = [float(late) for late in range(20, 40)]
+
+
+def results_of(first, second, alarms=0, hours=0.5):
+    """Two detectors on the same contacts; the first one raises the false alarms of the hold-out."""
+    groups = [("stiff", 4), ("holdout", 20)]
+    return Results(
+        provenance={},
+        detectors=("one", "two"),
+        groups=("stiff", "holdout"),
+        contacts=(*contacts_of("one", "stiff", first), *contacts_of("two", "stiff", second)),
+        false_alarms=tuple(FalseAlarmResult("h.csv", "holdout", "one", "axis", float(i)) for i in range(alarms)),
+        exposure=tuple(
+            ExposureResult(group, name, count, count, hours) for group, count in groups for name in ("one", "two")
+        ),
+        recordings=(),
+    )
+
+
+def told(results):
+    return {group.text: words.text for group, words in best_table(evaluate(results)).rows}
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "alarms", "words"),
+    [
+        (FAST, SLOW, 0, "one is best: median 11"),
+        (FAST, SLOW, 3, "two is best: "),  # a fast detector that raises false alarms is not the best
+        ([*FAST[:3], None], SLOW, 0, "two is best"),
+        ([*FAST[:3], "standing still"], SLOW, 0, "two is best"),
+        (
+            [*FAST[:3], None],
+            [*SLOW[:3], None],
+            0,
+            "every detector missed contacts; one is best: median 1",
+        ),
+        (FAST, FAST, 0, "one and two are equally good: median 11"),
+        ([None] * 4, [None] * 4, 0, "no detector detected a contact: 4 of 4 contacts missed (at most 100 %)"),
+        (FAST, ["standing still"] * 4, 0, "one is best"),
+    ],
+)
+def test_the_best_misses_least_then_is_quietest_then_fastest(first, second, alarms, words):
+    assert told(results_of(first, second, alarms))["stiff"].startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "alarms", "end"),
+    [
+        (FAST, SLOW, 0, " missed (at most 53 %), 0 false alarms; 4 contacts are too few to show a difference"),
+        (MANY, [late + 5.0 for late in MANY], 0, "0 false alarms; shown to be better than two"),
+        (MANY, [late + (-1) ** i * 5.0 + 0.5 for i, late in enumerate(MANY)], 0, "; not shown to be better than two"),
+        (FAST, FAST, 0, ", 0 false alarms"),
+        ([late - 5.0 for late in MANY], MANY, 2, "; one faster, but with more misses or false alarms"),
+    ],
+)
+def test_a_sentence_says_how_sure_its_choice_is(first, second, alarms, end):
+    assert told(results_of(first, second, alarms))["stiff"].endswith(end)
+
+
+def test_a_group_without_contacts_has_its_false_alarms_with_their_bounds():
+    quiet, loud = told(results_of(FAST, SLOW)), told(results_of(FAST, SLOW, 2, hours=2.0))
+    most = "in 20 operations (at most 0.150 per operation"
+    assert quiet["holdout"] == f"no contacts; no false alarm of any detector {most})"
+    assert loud["holdout"] == (
+        f"no contacts; no false alarm of two {most}, 1.50 per hour); "
+        "2 false alarms of one in 20 operations (at most 0.315 per operation, 3.15 per hour)"
+    )
+    blind = replace(results_of(FAST, SLOW), exposure=(ExposureResult("holdout", "one", 4, 4, 0.0, 4),))
+    assert told(blind)["holdout"] == "no contacts; false alarms not assessable"
