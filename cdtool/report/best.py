@@ -1,8 +1,13 @@
 """Each group of a benchmark in a sentence: the best detector, its latency, and what its zeros can mean at most.
 
 Conventions: best is who has the fewest contacts missed or not assessable, then the fewest false alarms in all groups,
+<<<<<<< HEAD
+then the least median as it is shown; equal ones are named together. Whether that difference is more than chance
+is known from the comparisons of pairs.
+=======
 then the least median as it is shown; equal ones are named together. Whether that difference is more than chance is
 known from the comparisons of pairs.
+>>>>>>> main
 """
 
 from __future__ import annotations
@@ -21,6 +26,7 @@ BEST = (
     "Best: fewest contacts missed or not assessable, then fewest false alarms in all groups, then least median of the "
     "latency from the onset to the alarm. “At most”: one-sided 95 % bound."
 )
+_ALARMS_UNKNOWN = f"false alarms {NOT_ASSESSABLE}"
 
 
 def best_table(evaluated: Evaluated) -> Table:
@@ -60,7 +66,8 @@ def _of_contacts(evaluated: Evaluated, items: Sequence[Summary], alarms: Mapping
     words = "every detector missed contacts; " if others and all(item.missed for item in items) else ""
     words += _named(equal) + (" are equally good" if len(equal) > 1 else " is best" if others else "")
     count = alarms[first.detector]
-    heard = counted(int(count), "false alarm") if math.isfinite(count) else f"false alarms {NOT_ASSESSABLE}"
+    heard = f"{counted(int(count), 'false alarm')} in all groups" if math.isfinite(count) else _ALARMS_UNKNOWN
+    heard = heard if count else "no false alarm"
     return f"{words}: median {_median(first)}, {_outcomes(first)}, {heard}{_evidence(evaluated, first, equal)}"
 
 
@@ -107,7 +114,7 @@ def _evidence(evaluated: Evaluated, first: Summary, equal: Sequence[str]) -> str
 def _of_false_alarms(items: Sequence[Summary]) -> str:
     counts = [item for item in items if has_exposure(item)]
     if not counts:
-        return f"false alarms {NOT_ASSESSABLE}" if any(item.operations for item in items) else "nothing was scored"
+        return _ALARMS_UNKNOWN if any(item.operations for item in items) else "nothing was scored"
     quiet = [item for item in counts if not item.false_alarms]
     words = []
     if quiet:

@@ -12,6 +12,8 @@ from cdtool.report.table import Table
 if TYPE_CHECKING:
     import pandas as pd
 
+    from cdtool.report.table import Table
+
 # Legible beside a white and a black background.
 _COLOURS = {"good": "#1f9254", "bad": "#d93a2f", "unknown": "#c98500"}
 

@@ -89,7 +89,7 @@ def assert_same_everywhere(evaluated: Evaluated, tone: str, status: int, folder:
     html, markdown, junit, stored = reports(evaluated)
     assert (conclusion.tone, conclusion.exit_status) == (tone, status)
     shown = str(escape(f"{head[:1].upper()}{head[1:]}"))
-    assert f'<p class="verdict {tone}"><strong>{shown}</strong>' in html
+    assert f'<div class="verdict {tone}">\n<h1>{shown}</h1>' in html
     assert markdown.startswith(f"# Collision detection: {head}\n")
     assert (stored["tone"], stored["exit_status"], stored["headline"]) == (tone, status, head)
     first = junit.find("testsuite/testcase")

@@ -12,6 +12,7 @@ from cdtool.base.plain_text import LISTED, shorten
 from cdtool.commands.console.console import detector_table, leave, print_written, say
 from cdtool.commands.console.options import ForceOption, JsonOption, QuietOption
 from cdtool.commands.console.place import Place, location
+from cdtool.report.table import shown
 
 if TYPE_CHECKING:
     from cdtool.commands.compare.comparison import BuildComparison
@@ -136,7 +137,7 @@ def _show_table(found: BuildComparison) -> None:
     figures: tuple[Figure, ...] = ("missed", "not_assessable", "false_alarms", "force_at_alarm_n")
     rows = [
         (
-            shorten(row.group, _LONGEST_GROUP),
+            shorten(shown(row.group), _LONGEST_GROUP),
             shorten(row.detector, _LONGEST_DETECTOR),
             contacts_of(row),
             both(row, "latency_ms"),
@@ -157,7 +158,7 @@ def _show_rows(rows: Sequence[BuildRow]) -> None:
     for rows_alike in _alike(rows):
         first = rows_alike[0]
         alike = ", ".join(shorten(row.detector, 2 * _LONGEST_DETECTOR) for row in rows_alike)
-        where = f"{shorten(first.group, 2 * _LONGEST_GROUP)}, {alike}"
+        where = f"{shorten(shown(first.group), 2 * _LONGEST_GROUP)}, {alike}"
         say(f"{where}: {first.words}", tone=_TONES.get(first.outcome, ""))
 
 

@@ -148,28 +148,30 @@ def _show_notes(detections: list[Detection]) -> None:
 
 
 def _show_not_assessable(detections: list[Detection]) -> None:
-    """Print the share of each operation that is not assessable, and the time, position and reason of long sections."""
+    """Print the shares of each operation that are not assessable; of a single one the longest sections."""
     shown = [detection for detection in detections if detection.statistic.shares()]
     for detection in shown[:LISTED]:
-        sections = detection.not_assessable_sections()
-        longest = sorted(sections, key=lambda item: item.start - item.end)[:NAMED]
-        unit = detection.operation.recording["position"].unit if "position" in detection.operation.recording else ""
-        parts = []
-        for item in sorted(longest, key=lambda item: item.start):
-            where = (
-                f" ({_place(item.position_start)} to {_place(item.position_end)} {unit})"
-                if math.isfinite(item.position_start + item.position_end)
-                else ""
-            )
-            parts.append(f"{item.start:.2f} to {item.end:.2f} s{where} {item.reason}")
-        if more := len(sections) - len(longest):
-            parts.append(f"and {counted(more, 'shorter section')} (--json has all)")
+        parts = _sections(detection) if len(shown) == 1 else [detection.statistic.why_not()]
         if detection.other_speed and detection.verdict.outcome != "not_assessable":  # otherwise it is among the reasons
             parts.append(detection.other_speed)
-        share = 1.0 - float(detection.statistic.valid.mean())
-        say(f"not assessable in {detection.operation.name}: {100.0 * share:.0f} %; {'; '.join(parts)}")
+        say(f"not assessable in {detection.operation.name}: {'; '.join(parts)}")
     if len(shown) > LISTED:
         print_line(f"not assessable: and {counted(len(shown) - LISTED, 'more operation')} (--json has all)")
+
+
+def _sections(detection: Detection) -> list[str]:
+    """Return the share that is not assessable, and time, position and reason of the longest sections."""
+    sections = detection.not_assessable_sections()
+    longest = sorted(sections, key=lambda item: item.start - item.end)[:NAMED]
+    unit = detection.operation.recording["position"].unit if "position" in detection.operation.recording else ""
+    parts = [f"{100.0 * (1.0 - float(detection.statistic.valid.mean())):.0f} %"]
+    for item in sorted(longest, key=lambda item: item.start):
+        is_placed = math.isfinite(item.position_start + item.position_end)
+        where = f" ({_place(item.position_start)} to {_place(item.position_end)} {unit})" if is_placed else ""
+        parts.append(f"{item.start:.2f} to {item.end:.2f} s{where} {item.reason}")
+    if more := len(sections) - len(longest):
+        parts.append(f"and {counted(more, 'shorter section')} (--json has all)")
+    return parts
 
 
 def _place(way: float) -> str:

@@ -120,7 +120,7 @@ def _all_marks(results: Results) -> dict[tuple[str, str], _Marks]:
 
 
 def latency_axis(results: Results) -> LatencyAxis:
-    """Return the axis of all latencies; if there are none, of the times for which missed contacts were monitored."""
+    """Return the axis of all latencies; without any, of the times for which missed contacts were monitored."""
     rows = results.scored_contacts
     late = [row.latency_ms for row in rows if row.latency_ms is not None]
     return LatencyAxis.of(np.array(late or [row.watched_ms or 0.0 for row in rows if row.outcome == "missed"]))

@@ -113,11 +113,10 @@ def results_table(items: Sequence[Summary]) -> Table:
         (Heading("detector"), lambda item: name_cell(item.detector))
     ]
     if any(item.contacts for item in items):
+        columns = latency_columns(items)
+        kept = [name for name in columns if name in ("median", "range" if "range" in columns else "P95")]
         fields += [
-            (Heading("median [ms]", numeric=True), lambda item: _short(item, item.median)),
-            (Heading("range [ms]", numeric=True), partial(latency_cell, "range"))
-            if "range" in latency_columns(items)
-            else (Heading("P95 [ms]", numeric=True), lambda item: _short(item, item.p95)),
+            *((Heading(f"{name} [ms]", numeric=True), partial(latency_cell, name)) for name in kept),
             (Heading(MISSED, numeric=True, choice=True), _short_missed),
         ]
     fields.append((Heading(FALSE_ALARMS, numeric=True, choice=True), _short_false_alarms))
@@ -147,32 +146,23 @@ def _taken_out(rows: Sequence[list[Cell]], place: int, heading: str) -> str:
     return f"; {heading}{''.join(*details)}"
 
 
-def every_result_table(results: Results, items: Sequence[Summary]) -> Table:
-    """Return all latencies with what they must be read with, a row per summary.
+def every_result_table(results: Results, items: Sequence[Summary], *, kinds: bool = False) -> Table:
+    """Return all latencies with what they must be read with, a row per summary, of groups or of kinds of contacts.
 
     Columns that no row fills are left out; so is a rate per hour where less than an hour was recorded.
     """
     fields: list[tuple[Heading, Callable[[Summary], Cell]]] = [
         (Heading("detector"), lambda item: detector_cell(results, item.detector)),
-        (Heading("group", choice=True), lambda item: name_cell(item.group)),
+        (Heading("group/kind" if kinds else "group", choice=True), lambda item: name_cell(item.group)),
         *_of_contacts(items),
-        (Heading(FALSE_ALARMS, numeric=True), _false_alarms),
-        (Heading("false alarms per operation", numeric=True), _per_operation),
     ]
+    if not kinds:  # a false alarm belongs to none
+        fields.append((Heading(FALSE_ALARMS, numeric=True), _false_alarms))
+        fields.append((Heading("false alarms per operation", numeric=True), _per_operation))
     if any(map(_has_hour, items)):
         fields.append((Heading("per hour", numeric=True), _per_hour))
-    return tabulate("all_results", "All results", [*fields, *_of_force(items)], items, "contacts")
-
-
-def kinds_table(results: Results, items: Sequence[Summary]) -> Table:
-    """Return the latencies of each kind of contact, a row per summary; without rows if no contact has a kind."""
-    fields: list[tuple[Heading, Callable[[Summary], Cell]]] = [
-        (Heading("detector"), lambda item: detector_cell(results, item.detector)),
-        (Heading("group/kind", choice=True), lambda item: name_cell(item.group)),
-        *_of_contacts(items),
-        *_of_force(items),
-    ]
-    return tabulate("kinds", "Latency and misses by kind of contact", fields, items, "contacts")
+    name, title = ("kinds", "Latency and misses by kind of contact") if kinds else ("all_results", "All results")
+    return tabulate(name, title, [*fields, *_of_force(items)], items, "contacts")
 
 
 def _of_contacts(items: Sequence[Summary]) -> list[tuple[Heading, Callable[[Summary], Cell]]]:
@@ -222,16 +212,11 @@ def comparisons_table(evaluated: Evaluated) -> Table:
 def comparisons_note(evaluated: Evaluated) -> str:
     """Return how many pairs of detectors show a difference, and how many could not have shown one; empty if none."""
     without = without_difference(evaluated.comparisons)
-    few, pairs = without.count(TOO_FEW), counted(len(without), "pair")
-    rule = "Recordings of one campaign count as one."
     if not without:
         return ""
-    if few == len(without):
-        return (
-            f"No difference can be shown between {pairs} of detectors: too few recordings of the same contacts. {rule}"
-        )
-    words = f"A difference is shown in {without.count('')} of {pairs} of detectors"
-    return f"{words}; in {few} there are {TOO_FEW}. {rule}" if few else f"{words}."
+    words = f"A difference is shown in {without.count('')} of {counted(len(without), 'pair')} of detectors"
+    few = f"; in {without.count(TOO_FEW)} there are {TOO_FEW}, those of one campaign counted as one"
+    return f"{words}{few if TOO_FEW in without else ''}."
 
 
 def calibration_table(results: Results) -> Table:
@@ -254,13 +239,6 @@ def latency_cell(column: LatencyColumn, item: Summary) -> Cell:
         return empty_cell() if interval is None else interval_cell(interval, item.resolution_ms)
     ends = dict.fromkeys(number(end, error=item.resolution_ms) for end in (item.min_ms, item.max_ms))
     return Cell(" to ".join(ends), key=key_of(item.max_ms))
-
-
-def _short(item: Summary, interval: Interval) -> Cell:
-    """Return a latency; its interval only if there is one."""
-    if math.isnan(interval.low) or math.isnan(interval.high):
-        return number_cell(interval.value, item.resolution_ms)
-    return interval_cell(interval, item.resolution_ms)
 
 
 def _short_missed(item: Summary) -> Cell:

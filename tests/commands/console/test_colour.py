@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -10,7 +11,7 @@ from dataclasses import replace
 import pytest
 
 from cdtool.commands.console.colour import Toned, shows_colour
-from cdtool.commands.console.console import say, table
+from cdtool.commands.console.console import print_next, say, table
 from cdtool.commands.console.summary_table import show_conclusion, show_table
 from cdtool.results.evaluated import evaluate
 from cdtool.results.results import ContactResult, ExposureResult, Results
@@ -55,6 +56,29 @@ def test_no_colour_is_shown_where_the_environment_does_not_want_it(terminal, mon
     assert not re.search(r"\x1b\[[0-9;]*3[0-9]m", capsys.readouterr().out)
 
 
+@pytest.mark.parametrize("columns", [60, 80, 120])
+def test_a_table_fits_the_terminal_without_a_broken_word_or_trailing_blanks(terminal, monkeypatch, capsys, columns):
+    terminal(columns)
+    monkeypatch.setenv("NO_COLOR", "1")
+    sentence = "Text exports: each channel has the times beside it, in s since the start of the export, with its unit."
+    table([("name", "left"), ("description", "left")], [("twincat_scope", sentence), ("csv", "Text tables.")])
+    table([("log", "left"), *[("range\nms", "right")] * 9], [("gate/stiff/03.csv", *["12.3 to 45.6"] * 9)])
+    lines = capsys.readouterr().out.splitlines()
+    assert all(line == line.rstrip() and len(line) <= columns for line in lines)
+    assert max(map(len, lines)) > columns - 15, "the terminal is used"
+    known = f"name description twincat_scope csv Text tables. log range ms gate/stiff/03.csv 12.3 to 45.6 {sentence}"
+    assert {word for line in lines for word in line.split()} == set(known.split())
+
+
+def test_the_command_to_run_next_fits_and_can_be_pasted(terminal, capsys):
+    terminal(60)
+    words = ["cdtool", "benchmark", "a folder/benchmark.toml", "-p", "protocol.toml", "-o", "reports/protocol.pdf"]
+    print_next(*words)
+    out = capsys.readouterr().out
+    assert all(len(line) <= 60 for line in out.splitlines()) and "-p protocol.toml" in out
+    assert shlex.split(out.removeprefix("next: ").replace("\\\n", "")) == words
+
+
 def test_missed_contacts_and_false_alarms_are_red_and_not_assessable_ones_yellow(terminal, capsys):
     terminal(120)
     evaluated, _ = case()
@@ -67,7 +91,7 @@ def test_missed_contacts_and_false_alarms_are_red_and_not_assessable_ones_yellow
     assert f"{RED}\x1b[1m1 of 11\x1b" in stiff and "\x1b[33m\x1b[22m1 of 12\x1b" in stiff
     quick = next(line for line in lines if line.startswith("stiff") and "quick" in line)
     assert "\x1b" not in quick, "zeros have no colour"
-    free = next(line for line in lines if line.startswith("holdout") and "slow" in line)
+    free = next(line for line in lines if line.startswith("hold-out") and "slow" in line)
     assert f"{RED}\x1b[1m1 in " in free
 
 

@@ -117,7 +117,7 @@ def test_a_failed_protocol_is_the_first_sentence_everywhere_and_exits_with_1(tmp
     assert made.status == 1 and made.out.startswith(f"t{fail}; all 2 limits are met")
     document, html, markdown, junit, results = (path.read_text(encoding="utf-8") for path in targets)
     assert fail.partition("fail: ")[2] in document
-    assert f'<p class="verdict bad"><strong>T{fail}; all 2' in html
+    assert re.search(rf'<div class="verdict bad">\s*<h1>T{fail}; all 2', html)
     assert (
         markdown.startswith(f"# Collision detection: t{fail}; all 2") and f'"failure" message="t{fail}; all 2' in junit
     )

@@ -29,7 +29,7 @@ _LIMITS = ("limit", "needed", "begin", "until", "range")
 # Values of a sentence that a person, a profile or an instrument states.
 _STATED = frozenset((*_LIMITS, "stated", "planned", "tolerance", "cell", "entered", "stiffness", "length", "record"))
 # Values that say where a reason is.
-_WHERE = ("point", "repetition", "recording", "key", "profile")
+_WHERE = ("point", "repetition", "recording", "other", "key", "profile")
 
 
 @dataclass(frozen=True)
@@ -129,13 +129,13 @@ class Words:
                 points.setdefault(str(reason.values["point"]), []).append(reason.values)
         places = []
         for point, items in points.items():
-            recordings = list(dict.fromkeys(str(item["recording"]) for item in items if "recording" in item))
+            recordings = [" = ".join(str(item[key]) for key in ("recording", "other") if key in item) for item in items]
             numbers = ", ".join(dict.fromkeys(str(item["repetition"]) for item in items if "repetition" in item))
             if numbers:
-                key = "where.one" if len(recordings) == 1 else "where.several"
+                key = "where.one" if len(set(recordings)) == 1 else "where.several"
                 places.append(self(key, point=point, numbers=numbers, recording=recordings[0]))
             else:
-                places.append(", ".join([point, *recordings]))
+                places.append(", ".join([point, *dict.fromkeys(filter(None, recordings))]))
         return "; ".join(places)
 
     def _measured(self, value: object, limit: object) -> str:

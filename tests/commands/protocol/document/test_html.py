@@ -10,10 +10,8 @@ from pathlib import Path
 import pytest
 
 from cdtool.commands.protocol.assessment.plan import MachineParticulars
-from cdtool.commands.protocol.document.blocks import HeadedTable
 from cdtool.commands.protocol.document.document import protocol_document
 from cdtool.commands.protocol.document.html import to_html
-from cdtool.report.number_text import number
 from tests.report.hostile import HOSTILE
 from tests.report.table_headings import unnamed
 
@@ -34,13 +32,6 @@ def test_the_text_of_a_protocol_is_as_approved(name, documents):
     """To approve a new text, read it and write it to the file that the message names."""
     path = GOLDEN / f"{name}.txt"
     assert text_of(to_html(documents[name])) == path.read_text(encoding="utf-8"), path
-
-
-def test_a_latency_is_rounded_as_in_the_reports(protocols, documents):
-    latencies = [item.latencies_ms["momentum"] for item in protocols["pass"].points[0].repetitions]
-    tables = [block for block in documents["pass"].blocks if isinstance(block, HeadedTable)]
-    (table,) = [block for block in tables if block.columns[-1] == "momentum"]
-    assert [row[-1] for row in table.rows] == [number(value, error=error) for value, error in latencies]
 
 
 def test_it_loads_nothing_runs_nothing_and_shows_hostile_names_as_text(protocols):

@@ -107,3 +107,11 @@ def test_reasons_that_differ_only_in_place_and_measured_value_are_one_sentence()
     (sentence,) = words_of("de").reasons(verdict, "incomplete")
     assert sentence.startswith("edge, Nr. 1, 2; side, Nr. 1 (1.csv): Die Aufzeichnung endet 1,20 bis 4,9996 s nach")
     assert len(words_of("en").reasons(verdict, "fail")) == 2
+
+
+def test_measurements_that_are_counted_twice_are_listed_in_one_sentence():
+    about = {"other": "1.csv", "contact": 1, "other_contact": 1}
+    places = [("edge", "2.csv"), ("edge", "3.csv"), ("side", "4.csv")]
+    same = [Reason("same_measurement", {"point": point, "recording": log, **about}) for point, log in places]
+    (sentence,) = words_of("en").reasons(ProtocolVerdict(tuple(same)), "incomplete")
+    assert sentence.startswith("edge, 2.csv = 1.csv, 3.csv = 1.csv; side, 4.csv = 1.csv: the same measurement")
