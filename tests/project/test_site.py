@@ -18,7 +18,7 @@ from tests.report.html.test_html_in_browser import browser as browser
 from tests.report.html.test_html_in_browser import pytestmark as in_browser
 
 SITE = DOCS / "site"
-TALLEST = 5500  # [px] of a page at a width of 1,400
+TALLEST = 5100  # [px] of a page at a width of 1,400
 # The page that a search for a word shows first.
 EXPLAINS = {
     **dict.fromkeys(("false alarm", "latency", "onset", "missed", "not assessable"), "docs/evaluation.html"),
