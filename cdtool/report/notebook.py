@@ -7,6 +7,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from cdtool.report.number_text import NOTHING, short
+from cdtool.report.table import Table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,7 +21,7 @@ _COLOURS = {"good": "#1f9254", "bad": "#d93a2f", "unknown": "#c98500"}
 def notebook_table(verdict: str, frame: pd.DataFrame, about: str, tone: str = "") -> str:
     """Return a frame as HTML below its verdict, which a notebook shows; of many rows the first and the last ten.
 
-    `about` is a line below the verdict. Texts are escaped; NaN is a dash, a time has milliseconds.
+    `about` is below the verdict. Texts are escaped; NaN is a dash, a time has milliseconds.
 
     >>> import pandas as pd
     >>> notebook_table("All <2> limits are met", pd.DataFrame({"latency_ms": [31.0]}), "gate", "good")[:60]
@@ -32,16 +33,16 @@ def notebook_table(verdict: str, frame: pd.DataFrame, about: str, tone: str = ""
     hides = len(frame) > 20
     table = frame.to_html(index=False, na_rep=NOTHING, formatters=formats, max_rows=20, show_dimensions=hides)
     style = f"border-left: 6px solid {_COLOURS.get(tone, '#888')}; padding-left: 8px"
-    sentence = escape(verdict[:1].upper() + verdict[1:])
-    return f'<p style="{style}"><strong>{sentence}</strong><br>{escape(about)}</p>{table}'
+    sentence, lines = escape(verdict[:1].upper() + verdict[1:]), escape(about).replace("\n", "<br>")
+    return f'<p style="{style}"><strong>{sentence}</strong><br>{lines}</p>{table}'
 
 
 def as_frame(table: Table) -> pd.DataFrame:
-    """Return a table of the report as a DataFrame of its texts; the heading of a part is a row of its own."""
+    """Return a table of the report as a DataFrame of its texts; its first column has the heading of a row's part."""
     import pandas as pd
 
-    names = [column.heading for column in table.columns]
-    rows = [[cell.line for cell in row] for row in table.rows]
-    for place, part in [*table.parts.items()][::-1]:
-        rows.insert(place, [part.line, *[""] * (len(names) - 1)])
-    return pd.DataFrame(rows, columns=names)
+    rows, part = list[list[str]](), ""
+    for place, row in enumerate(table.rows):
+        part = table.parts[place].text if place in table.parts else part
+        rows.append([part, *(cell.line for cell in row)])
+    return pd.DataFrame(rows, columns=["group", *(column.heading for column in table.columns)])

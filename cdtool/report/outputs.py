@@ -36,7 +36,7 @@ def check_outputs(targets: Sequence[Path], *, force: bool = False, subject: Subj
             _check_folder(target, force=force)
             continue
         writer = _writer_of(target, subject)
-        check_parent(target)
+        _check_parent(target)
         writer.check(target)
         if not writer.writes_folder:
             for path in writer.files(target):
@@ -52,7 +52,7 @@ def check_output_names(targets: Sequence[Path], suffixes: Sequence[str]) -> None
         if targets.count(target) > 1:
             raise UsageError(f"--output is '{plain(target)}' twice", "give each name once")
         resolved(target)
-        check_parent(target)
+        _check_parent(target)
 
 
 def write_outputs(
@@ -189,11 +189,10 @@ def _check_folder(target: Path, *, force: bool) -> None:
         return
     if target.exists():
         raise UsageError(f"--output '{plain(target)}' exists and is not a folder", "choose another name")
-    check_parent(target)
+    _check_parent(target)
 
 
-def check_parent(target: Path) -> None:
-    """Raise UsageError if the folder of a file to be written does not exist or is not writable."""
+def _check_parent(target: Path) -> None:
     if is_remote(target):
         check_place(target)
         return

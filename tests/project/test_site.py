@@ -15,9 +15,10 @@ import pytest
 from cdtool.commands.app import COMMANDS
 from tests.project.pages import DOCS, PAGES, ROOT
 from tests.report.html.test_html_in_browser import browser as browser
+from tests.report.html.test_html_in_browser import pytestmark as in_browser
 
 SITE = DOCS / "site"
-TALLEST = 5500  # [px] of a page at a width of 1,400
+TALLEST = 5100  # [px] of a page at a width of 1,400
 # The page that a search for a word shows first.
 EXPLAINS = {
     **dict.fromkeys(("false alarm", "latency", "onset", "missed", "not assessable"), "docs/evaluation.html"),
@@ -77,6 +78,7 @@ def test_equations_are_written_as_github_and_the_site_render_them():
         latex2mathml.tex2mathml(text.strip(), as_block=True)
 
 
+@in_browser
 def test_the_built_site_opens_with_a_report_and_its_search_with_what_explains_a_word(browser: Any, tmp_path: Path):
     for name in ("sphinx", "myst_parser", "pydata_sphinx_theme", "sphinx_design", "nbclient", "ipykernel"):
         pytest.importorskip(name)

@@ -198,8 +198,9 @@ class BenchmarkResult:
         from cdtool.report.notebook import as_frame, notebook_table
         from cdtool.report.tables.results import results_table
 
-        rows = as_frame(results_table(self.evaluated.summaries))
-        return notebook_table(self.headline, rows, counts_text(self.evaluated), self.results.conclusion.tone)
+        table = results_table(self.evaluated.summaries)
+        about = "\n".join((counts_text(self.evaluated), *(part.line for part in table.parts.values() if part.details)))
+        return notebook_table(self.headline, as_frame(table), about, self.results.conclusion.tone)
 
 
 @dataclass(frozen=True)
