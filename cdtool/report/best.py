@@ -18,7 +18,7 @@ from collections.abc import Mapping, Sequence
 from cdtool.base.plain_text import NAMED, counted
 from cdtool.report.number_text import NOT_ASSESSABLE, missed, number, value_and_interval
 from cdtool.report.table import Cell, Heading, Table, name_cell, shown
-from cdtool.report.tables.results import TOO_FEW, at_most, has_exposure, without_difference
+from cdtool.report.tables.results import TOO_FEW, at_most, has_exposure, part_of, without_difference
 from cdtool.results.evaluated import Evaluated
 from cdtool.results.summary import Summary
 
@@ -40,7 +40,8 @@ def best_table(evaluated: Evaluated) -> Table:
         items = [item for item in evaluated.summaries if item.group == group]
         hit = [item for item in items if item.contacts]
         words = _of_contacts(evaluated, hit, alarms) if hit else f"no contacts; {_of_false_alarms(items)}"
-        rows.append((name_cell(group), Cell(words)))
+        made = "injected contacts; " if group in part_of(evaluated.results.provenance, "injected") else ""
+        rows.append((name_cell(group), Cell(made + words)))
     return Table("best", "Best detectors", (Heading("group"), Heading("best detector")), rows, "contacts")
 
 

@@ -71,6 +71,11 @@ def test_a_sentence_says_how_sure_its_choice_is(first, second, alarms, end):
     assert told(results_of(first, second, alarms))["stiff"].endswith(end)
 
 
+def test_injected_contacts_are_named_as_such():
+    made = replace(results_of(FAST, SLOW), provenance={"injected": {"stiff": {}}})
+    assert told(made)["stiff"].startswith("injected contacts; one is best")
+
+
 def test_a_group_without_contacts_has_its_false_alarms_with_their_bounds():
     quiet, loud = told(results_of(FAST, SLOW)), told(results_of(FAST, SLOW, 2, hours=2.0))
     most = "in 20 operations (at most 0.150 per operation"

@@ -173,7 +173,7 @@ def _difference(difference: float, std: PlannedDeviation, unpaired: bool, power:
     # If recordings contain several contacts, the spread is that of recordings.
     grouped = any(item.clusters < item.n for item in std.spreads)
     unit = "recordings or campaigns" if grouped else "impacts"
-    each = " in each of two sets" if unpaired else ", each scored for both"
+    each = " in each of two sets" if unpaired else ", each with both builds or detectors"
     like = f"{each}, with as many contacts in each as measured" if grouped else each
     of = "within a set" if unpaired else "of the differences"
     source = f", measured: {std.source}" if std.source else ""

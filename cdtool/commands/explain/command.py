@@ -154,7 +154,7 @@ def _show_event(item: Explanation) -> None:
         for moment in item.moments
     ]
     if rows:
-        heads = ("from onset\nms", "to alarm\nms", f"signal\n{item.unit}", "limit\n", "margin\n", "of limit\n%")
+        heads = ("from onset\nms", "to alarm\nms", f"signal\n{item.unit}", "limit\n", "margin\n", "of band\n%")
         table([*((head, "right") for head in heads), ("", "left")], rows)
     typer.echo()
 

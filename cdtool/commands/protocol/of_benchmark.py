@@ -83,8 +83,9 @@ class ProtocolOfBenchmark:
 
 def written_lines(made: Protocol, written: Sequence[Path]) -> list[str]:
     """Return the files of a protocol, and the next step."""
-    if made.verdict.outcome == "incomplete":
-        step = "settle what is incomplete, and write the protocol again"
-    else:
-        step = "check entries, curves and limits against the standard, print and sign"
+    step = {
+        "pass": "check entries, curves and limits against the standard, print and sign",
+        "fail": "settle why it fails and what is incomplete, and repeat the test",
+        "incomplete": "settle what is incomplete, and write the protocol again",
+    }[made.verdict.outcome]
     return [*(f"written: {plain(path)}" for path in written), f"next: {step}"]

@@ -14,7 +14,7 @@ from cdtool.commands.tune.tuned_rows import Tuning
 from cdtool.report.html.page_tables import visible
 from cdtool.report.html.sections_page import PageSection, SectionsPage, left_out_sections
 from cdtool.report.model import NO_CERTIFICATE
-from cdtool.report.number_text import NOTHING, number, short
+from cdtool.report.number_text import NOTHING, number, percent, short
 from cdtool.report.table import Cell, Heading, Table, count_cell, interval_cell, number_cell, tabulate
 
 _GOALS = {
@@ -114,7 +114,7 @@ def _alarms_cell(figures: ChoiceResults) -> Cell:
 def alarms_words(figures: ChoiceResults) -> str:
     """Return the 95 % interval of the share of alarming runs in words."""
     share = figures.alarm_share
-    return f"{100.0 * share.low:.1f} to {100.0 * share.high:.1f} %"
+    return f"{number(100.0 * share.low, 2)} to {percent(share.high)}"
 
 
 def debounce_words(tuned: TunedDetector) -> str:
@@ -134,7 +134,7 @@ def apparent_words(tuning: Tuning) -> list[str]:
 def rejection_words(tuned: TunedDetector) -> list[str]:
     """Return why kinds of rules that were best are not chosen, a sentence each, without its full stop."""
     return [
-        f"Not chosen: {item.rule} as tuned: {visible(item.group)} is {100.0 * (item.ratio - 1.0):.0f} % worse with it "
+        f"Not chosen: {item.rule} as tuned: {visible(item.group)} is {percent(item.ratio - 1.0)} worse with it "
         "than by default on recordings not used for the choice"
         for item in tuned.rejected
     ]

@@ -14,12 +14,9 @@ from cdtool.report.writers.base import Image, Report
 _LEAST = 4_000
 #: A comment in a pull request is short.
 _REASONS, _LONGEST_REASON = 5, 160
-#: Two names and an outcome fit in one line of a comment.
-_LONGEST_NAME = 40
-# The model's tables with all other results, collapsed because they are wider than a comment.
-_DETAILS = ("attention", "all_results", "kinds", "conditions", "injected", "comparisons", "points")
-# The model's tables below the results, collapsed; its tables of the provenance follow.
+# The model's tables that are collapsed, because they are wider than a comment; its tables of the provenance follow.
 _FOLDED = (
+    *("attention", "all_results", "kinds", "conditions", "injected", "comparisons", "points"),
     *("missed", "false_alarms", "not_assessable_contacts", "in_progress", "not_assessable", "force_exceptions"),
     *("skipped", "damaged", "findings", "calibration", "met"),
 )
@@ -47,16 +44,12 @@ def to_markdown(report: Report, most: int = 60_000) -> str:
         results.append(Section(TITLES["comparisons"], escape(model.notes["pairs"], None)))
     if "force" in model.tables:
         results.append(_section(model.tables["force"], _force_sources(model)))
-    details, folded = (
-        [
-            _section(model.tables[name], escape(model.notes.get(name, ""), None), folded=True)
-            for name in names
-            if name in model.tables
-        ]
-        for names in (_DETAILS, _FOLDED)
-    )
-    folded += [_section(table, folded=True) for table in model.provenance]
-    return fitted(_head(model), (first, results, details, folded), most)
+    tables = [model.tables[name] for name in _FOLDED if name in model.tables]
+    folded = [
+        _section(table, escape(model.notes.get(table.name, ""), None), folded=True)
+        for table in (*tables, *model.provenance)
+    ]
+    return fitted(_head(model), (first, results, folded), most)
 
 
 def _head(model: Model) -> str:

@@ -70,7 +70,7 @@ def test_the_spread_of_an_earlier_test_is_measured_in_pairs(source):
     assert done.out == (
         f"to detect a difference of 1 ms with 80 % power (standard deviation of the differences {std:.3g} ms, "
         "measured: momentum minus pure_torque in stiff, 30 contacts, one per recording): "
-        f"{impacts_for_difference(1.0, std)} impacts, each scored for both\n"
+        f"{impacts_for_difference(1.0, std)} impacts, each with both builds or detectors\n"
     )
 
 
@@ -95,7 +95,7 @@ def test_contacts_of_one_campaign_count_as_one():
     (answer,) = api.plan(difference_ms=5.0, std_ms=found).answers
     assert answer.needs[0].unit == "recordings or campaigns"
     assert answer.needs[0].amount == impacts_for_difference(5.0, found.std)
-    assert answer.words.endswith("each scored for both, with as many contacts in each as measured")
+    assert answer.words.endswith("each with both builds or detectors, with as many contacts in each as measured")
 
 
 @pytest.mark.parametrize(

@@ -141,14 +141,14 @@ def _of_point(point: PointAssessment, words: Words) -> tuple[object, ...]:
 
 
 def _worst_text(protocol: Protocol, words: Words) -> Iterator[str]:
-    """Yield which value is furthest above its limit, or the closest one of a passed protocol, and by how much."""
+    """Yield which value is the largest share of its limit."""
     worst = {point.point.name: item for point in protocol.points if (item := _worst(point, words))}
     name = max(worst, key=lambda name: _share(worst[name]), default="")
     keys = {("fail", True): "verdict.exceeds_most", ("pass", False): "verdict.closest"}
     if worst and (key := keys.get((protocol.verdict.outcome, _share(worst[name]) > 1.0))):
         symbol, unit, value, limit = worst[name]
-        over = words.over(value, limit)
-        yield words(key, point=name, symbol=symbol, unit=unit, value=value, over=over, limit=limit)
+        share = words.beside(100.0 * _share(worst[name]), 100.0)
+        yield words(key, point=name, symbol=symbol, unit=unit, value=value, share=share, limit=limit)
 
 
 def _reasons(protocol: Protocol, words: Words) -> list[tuple[str, list[str]]]:

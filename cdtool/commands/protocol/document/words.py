@@ -86,11 +86,6 @@ class Words:
             return self.number(value)
         return self.number(value, digits_beside(value, limit, _DIGITS))
 
-    def over(self, value: float, limit: float) -> str:
-        """Return how far a value is from its limit, both as they are shown."""
-        decimals = len(self.beside(value, limit).partition(self.texts["decimal"])[2])
-        return self.limit(abs(round(value, decimals) - limit))
-
     def limit(self, value: float) -> str:
         """Return a limit with all its digits."""
         return self._spelt(digits(value, _ALL_DIGITS))
