@@ -52,6 +52,7 @@ def test_the_notebook_shows_the_verdict_and_the_numbers_of_the_readme():
     rows = re.findall(
         r"^(stiff|soft) +(\w+) +([\d.]+) ", (ROOT / "README.md").read_text(encoding="utf-8"), re.MULTILINE
     )
+    assert len(rows) == 10
     for group, detector, median in rows:
         assert re.search(rf"<td>{group}</td>\s*<td>{detector}</td>\s*<td>{median}(\.0)?\b", table), (group, detector)
 
