@@ -125,34 +125,25 @@ def _draw_points(axes: Axes, item: AmocCurve, x: FloatArray, kept: np.ndarray, s
             linestyle="none",
             zorder=4,
         )
+    arrow = {"arrowstyle": "<-", "color": look.colour, "linewidth": 1.0, "shrinkA": 0, "shrinkB": 0}
     for i in np.flatnonzero(kept[:-1] & np.isfinite(y[:-1]) & np.isinf(y[1:])).tolist():
-        axes.annotate("", (x[i], y[i]), xytext=(0.0, 15.0), textcoords="offset points", arrowprops=_arrow(look.colour))
-    if kept[item.in_use]:
+        axes.annotate("", (x[i], y[i]), xytext=(0.0, 15.0), textcoords="offset points", arrowprops=arrow)
+    if kept[item.in_use] and math.isfinite(y[item.in_use]):
         _mark_in_use(axes, item, float(x[item.in_use]), float(y[item.in_use]))
 
 
 def _mark_in_use(axes: Axes, item: AmocCurve, x: float, y: float) -> None:
-    look, point = look_of(item.detector), item.set_point
-    if math.isnan(y):
-        return
-    reached = math.isfinite(y)
+    look = look_of(item.detector)
     axes.plot(
         x,
-        y if reached else 0.88,
+        y,
         look.marker,
-        transform=axes.transData if reached else axes.get_xaxis_transform(),
-        markerfacecolor="white" if point.missed else look.colour,
+        markerfacecolor="white" if item.set_point.missed else look.colour,
         markeredgecolor="black",
         markeredgewidth=1.2,
         markersize=8.5,
         zorder=6,
     )
-    if not reached:
-        axes.annotate("", (x, 0.91), (x, 1.0), xycoords=axes.get_xaxis_transform(), arrowprops=_arrow("black"))
-
-
-def _arrow(colour: str) -> dict[str, object]:
-    return {"arrowstyle": "<-", "color": colour, "linewidth": 1.0, "shrinkA": 0, "shrinkB": 0}
 
 
 def _write_row(table: SideTable, axes: Axes, place: int, row: Summary, curve: AmocCurve | None) -> None:

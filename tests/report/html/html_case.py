@@ -194,6 +194,7 @@ def _provenance(named: Naming, groups: tuple[str, ...]) -> dict[str, object]:
     return {
         "tool_version": "9.8.7",
         "machine": named("gate"),
+        "simulated": True,
         "onset": named("above 20 N, back to 8 N"),
         "gains": {named("quick"): {named("bandwidth"): 30.0}},
         "units": {named("quick"): "N"},

@@ -7,7 +7,7 @@ import hashlib
 import json
 import math
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from html.parser import HTMLParser
 from typing import Any
 
@@ -207,14 +207,6 @@ def test_the_results_say_once_for_a_group_what_all_its_detectors_share(page):
     assert [row[3] for row in rows[2:4]] == ["0 of 12 at most 22 %", "1 of 11 at most 36 % 1 not assessable"]
 
 
-def test_a_page_says_that_recordings_are_simulated_only_if_their_machine_file_does(made, page):
-    evaluated, traces = case()
-    provenance = {**evaluated.results.provenance, "simulated": True}
-    text = to_html(Report(replace(evaluated, results=replace(evaluated.results, provenance=provenance)), traces))
-    assert "simulated recordings" in parsed(text).text
-    assert "simulated recordings" not in page.text
-
-
 def test_a_force_curve_has_the_verdict_of_its_contact(page):
     panel = page.data["force"][0]
     assert panel["steps"] == [[0, 400, "dynamic"], [0.75, 150, "static"]]
@@ -232,6 +224,7 @@ def test_what_was_left_out_and_the_provenance_are_shown(page):
     assert page.tables["not-assessable-table"][1][3:] == ["6.0 %", "start-up 5.0 %, missing samples 1.0 %"]
     assert page.tables["calibration-table"][1] == ["quick (q)", "1/15op", "5.50", "2", "30", "0.0600"]
     assert ["cdtool version", "9.8.7"] in page.tables["provenance-table"]
+    assert "simulated recordings" in page.text
     assert page.tables["learned-table"][1] == ["learn.csv", "ef" * 32]
 
 
