@@ -42,7 +42,7 @@ def short(value: float) -> str:
 
 
 def with_interval(interval: Interval, error: float | None = None) -> str:
-    """Return a value with its interval; "(–)" where there is too little data for one."""
+    """Return a value with its interval, if there is enough data for one."""
     return "".join(value_and_interval(interval, error))
 
 
@@ -61,10 +61,8 @@ def value_and_interval(interval: Interval, error: float | None = None) -> tuple[
     if error is not None and math.isfinite(width):
         error = min(error, 0.5 * width)
     value, low, high = (_written(item, _decimals(leading, error=error)) for item in parts)
-    if low == high == NOT_REACHED:
-        return (NOT_REACHED,)
-    if low == high == NOTHING:
-        return value, f" ({NOTHING})"
+    if low == high and low in (NOT_REACHED, NOTHING):
+        return (value,)
     return (value, f" ({low}", f" to {high})") if high == NOT_REACHED else (value, f" ({low} to {high})")
 
 

@@ -123,7 +123,7 @@ def number_cell(value: float | None, error: float | None = None) -> Cell:
 def interval_cell(interval: Interval, error: float | None = None) -> Cell:
     """Return the cell of a value with its interval, if it has one; without an upper end it takes two small lines."""
     value, *details = value_and_interval(interval, error)
-    return Cell(value, () if math.isnan(interval.low) else tuple(details), key_of(interval.value))
+    return Cell(value, tuple(details), key_of(interval.value))
 
 
 def name_cell(name: object) -> Cell:

@@ -36,15 +36,15 @@ def test_a_number_has_three_digits_and_no_exponent(value, text):
         (Interval(33.5, 31.0, INF), "33.5 (31.0 to not reached)"),
         (Interval(INF, 70.0, INF), "not reached (70.0 to not reached)"),
         (Interval(INF, INF, INF), "not reached"),
-        (Interval(34.0, NAN, NAN), "34.0 (–)"),
+        (Interval(34.0, NAN, NAN), "34.0"),
         (Interval(NAN, NAN, NAN), "–"),
         (Interval(0.0, 0.0, 0.31), "0.000 (0.000 to 0.310)"),
         (Interval(-5.1, -6.2, -3.9), "-5.10 (-6.20 to -3.90)"),
         (Interval(-9.9e-14, -4.2222222, 6.3333333), "0.00 (-4.22 to 6.33)"),
-        (Interval(-9.9e-14, NAN, NAN), "0 (–)"),
+        (Interval(-9.9e-14, NAN, NAN), "0"),
         (Interval(1.5, -1e-14, 3.0), "1.50 (0.00 to 3.00)"),
         (Interval(300.0, -0.2, 600.0), "300 (0 to 600)"),
-        (Interval(0.002, NAN, NAN), "0.00200 (–)"),
+        (Interval(0.002, NAN, NAN), "0.00200"),
     ],
 )
 def test_an_interval_has_the_digits_of_its_value(interval, text):
@@ -66,7 +66,7 @@ def test_an_interval_has_the_digits_of_its_value(interval, text):
 )
 def test_no_digit_is_finer_than_the_error(value, error, text):
     assert number(value, error=error) == text
-    assert with_interval(Interval(value, NAN, NAN), error) == f"{text} (–)"
+    assert with_interval(Interval(value, NAN, NAN), error) == f"{text}"
 
 
 def test_the_mean_of_many_contacts_has_the_digits_of_its_own_error():

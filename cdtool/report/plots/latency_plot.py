@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _COLUMNS = (
-    SideColumn("median [ms]\n(95 % interval)", 132),
+    SideColumn("median [ms]", 132),
     SideColumn("detected", 66),
     SideColumn("missed", 38),
     SideColumn("not\nassessable", 52),
