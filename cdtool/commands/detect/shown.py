@@ -78,9 +78,7 @@ def _show(rows: Sequence[tuple[Detected, Detection, Matching, Sequence[ContactRe
     columns += [(f"signal\n{unit}", "right"), ("limit", "right"), ("latency\nms", "right"), ("why", "left")]
     print_line(f"{first.detector}: {plain(threshold)}")
     table(columns, cells)
-    rules = {
-        found.onset for found, _, matching, _ in rows for item in matching.matches if item.contact.found_by == _CELL
-    }
+    rules = {found.onset for found, _, _, contacts in rows for row in contacts if row.found_by == _CELL}
     for rule in sorted(rules):
         say(f"latency from contact onset to alarm, debounce included; onset: {rule}")
 
@@ -90,20 +88,21 @@ def _rows_of(
 ) -> list[tuple[object, ...]]:
     from cdtool.commands.detecting.detection import NO_CONTACT
     from cdtool.report.number_text import number as rounded
+    from cdtool.results.summary import later_ms
 
     name = detection.operation.name
-    latency = {item.alarm: item for item in matching.matches if item.alarm}
-    resolution = {item.alarm: row.resolution_ms for item, row in zip(matching.matches, contacts, strict=True)}
+    detected = {item.alarm: row for item, row in zip(matching.matches, contacts, strict=True) if item.alarm}
     rows: list[tuple[object, ...]] = []
-    for alarm in sorted({*detection.verdict.alarms, *latency}, key=lambda alarm: (alarm.time, alarm.column)):
-        late = rounded(1e3 * latency[alarm].latency, error=resolution[alarm]) if alarm in latency else "-"
+    for alarm in sorted({*detection.verdict.alarms, *detected}, key=lambda alarm: (alarm.time, alarm.column)):
+        contact = detected.get(alarm)
+        late = rounded(contact.latency_ms, error=contact.resolution_ms) if contact else "-"
         figures = (number(alarm.statistic, 4), number(alarm.limit, 4), late)
-        why = "" if alarm in latency else _why_no_latency(found, alarm)
-        if alarm in latency and latency[alarm].clipped:
+        why = "" if contact else _why_no_latency(found, alarm)
+        if contact and contact.clipped:
             why = _NEGATIVE
-        if alarm in latency and latency[alarm].contact.hole:
-            later = 1e3 * latency[alarm].contact.uncertainty
-            missing = f"up to {later:.0f} ms later: load-cell samples missing at the onset"
+        if contact and contact.onset_hole_ms:
+            later = rounded(later_ms(contact), error=contact.resolution_ms)
+            missing = f"up to {later} ms later: load-cell samples missing at the onset"
             why = f"{why}; {missing}" if why else missing
         verdict = Toned("alarm", "bad" if why == NO_CONTACT else "")
         rows.append((name, verdict, f"{alarm.time:.3f}", alarm.joint, *figures, why))
