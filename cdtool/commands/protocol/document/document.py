@@ -74,12 +74,15 @@ def _verdict_text(protocol: Protocol, words: Words) -> str:
 
 
 def _cover(protocol: Protocol, words: Words) -> Iterator[Block]:
-    """Yield the first page: the verdict, what was tested and with what, the points, the reasons, and who signs."""
+    """Yield the first page: the verdict, the reasons, what was tested and with what, the points, and who signs."""
     verdict, outcome = protocol.verdict, protocol.verdict.outcome
     text = [_verdict_text(protocol, words), *_worst_text(protocol, words)]
     if outcome == "fail" and (sentences := words.reasons(verdict, "incomplete")):
         text.append(words("verdict.open_items", count=len(sentences)))
     yield VerdictBox(outcome, words(f"verdict.{outcome}"), plain(" ".join(text)))
+    for why, sentences in _reasons(protocol, words):
+        yield SectionHeading(words(f"verdict.why_{why}"))
+        yield Items(tuple(map(plain, sentences)))
     yield Facts(tuple(_particulars(protocol, words)), columns=2)
     limits = "; ".join(_title(profile, words) for profile in _profiles(protocol))
     deviating = [] if _deviating(protocol, words) else [(words("section.deviations"), words("text.no_deviations"))]
@@ -87,9 +90,6 @@ def _cover(protocol: Protocol, words: Words) -> Iterator[Block]:
     yield SectionHeading(words("field.points"))
     columns = ("point", "worst", "value", "limit", "share", "result")
     yield _grid(words, columns, [_of_point(point, words) for point in protocol.points], numeric=(2, 3, 4))
-    for why, sentences in _reasons(protocol, words):
-        yield SectionHeading(words(f"verdict.why_{why}"))
-        yield Items(tuple(map(plain, sentences)))
     yield from _instruments(protocol, words)
     yield SectionHeading(words("verdict.notices"))
     yield Items(tuple(map(plain, _notices(protocol, words))))
