@@ -1,13 +1,8 @@
 """Each group of a benchmark in a sentence: the best detector, its latency, and what its zeros can mean at most.
 
 Conventions: best is who has the fewest contacts missed or not assessable, then the fewest false alarms in all groups,
-<<<<<<< HEAD
-then the least median as it is shown; equal ones are named together. Whether that difference is more than chance
-is known from the comparisons of pairs.
-=======
 then the least median as it is shown; equal ones are named together. Whether that difference is more than chance is
 known from the comparisons of pairs.
->>>>>>> main
 """
 
 from __future__ import annotations
@@ -16,15 +11,21 @@ import math
 from collections.abc import Mapping, Sequence
 
 from cdtool.base.plain_text import NAMED, counted
-from cdtool.report.number_text import NOT_ASSESSABLE, missed, number, value_and_interval
+from cdtool.report.number_text import NOT_ASSESSABLE, missed, value_and_interval
 from cdtool.report.table import Cell, Heading, Table, name_cell, shown
-from cdtool.report.tables.results import TOO_FEW, at_most, has_exposure, part_of, without_difference
+from cdtool.report.tables.results import TOO_FEW, at_most, has_exposure, latency_cell, part_of, without_difference
 from cdtool.results.evaluated import Evaluated
 from cdtool.results.summary import Summary
 
 BEST = (
     "Best: fewest contacts missed or not assessable, then fewest false alarms in all groups, then least median of the "
     "latency from the onset to the alarm. “At most”: one-sided 95 % bound."
+)
+# What a detector that is not the best can be ahead in.
+_AHEAD = (
+    "shown to miss fewer of the contacts that both could assess",
+    "faster on average",
+    "faster, but with more misses, false alarms or contacts not assessable",
 )
 _ALARMS_UNKNOWN = f"false alarms {NOT_ASSESSABLE}"
 
@@ -59,17 +60,15 @@ def _of_contacts(evaluated: Evaluated, items: Sequence[Summary], alarms: Mapping
         return item.missed + item.not_assessable, alarms[item.detector], median
 
     first, *others = sorted(items, key=rank)
-    alike = [item for item in others if rank(item)[:2] == rank(first)[:2]]
-    equal = [
-        first.detector,
-        *(item.detector for item in alike if _ms(item, item.median_ms) == _ms(first, first.median_ms)),
-    ]
+    alike = [item.detector for item in others if rank(item)[:2] == rank(first)[:2]]
+    places = [item for item in others if _median(item).split(" (")[0] == _median(first).split(" (")[0]]
+    equal = [first.detector, *(item.detector for item in places if item.detector in alike)]
     words = "every detector missed contacts; " if others and all(item.missed for item in items) else ""
     words += _named(equal) + (" are equally good" if len(equal) > 1 else " is best" if others else "")
     count = alarms[first.detector]
     heard = f"{counted(int(count), 'false alarm')} in all groups" if math.isfinite(count) else _ALARMS_UNKNOWN
     heard = heard if count else "no false alarm"
-    return f"{words}: median {_median(first)}, {_outcomes(first)}, {heard}{_evidence(evaluated, first, equal)}"
+    return f"{words}: median {_median(first)}, {_outcomes(first)}, {heard}{_evidence(evaluated, first, equal, alike)}"
 
 
 def _median(item: Summary) -> str:
@@ -77,37 +76,40 @@ def _median(item: Summary) -> str:
     value, *ends = value_and_interval(item.median, item.resolution_ms)
     unit = " ms" if math.isfinite(item.median_ms) else ""
     if math.isnan(item.median.low):
-        return f"{value}{unit} (range {_ms(item, item.min_ms)} to {_ms(item, item.max_ms)})"
+        return f"{value}{unit} (range {latency_cell('range', item).text})"
     return f"{value}{unit}{''.join(ends).replace('(', '(95 %: ')}"
-
-
-def _ms(item: Summary, latency: float) -> str:
-    return number(latency, error=item.resolution_ms)
 
 
 def _outcomes(item: Summary) -> str:
     count, *bound = missed(item.missed, item.assessable, item.missed_at_most)
     most = f" ({bound[0].lstrip(': ')})" if bound else ""
-    unseen = f", {item.not_assessable} {NOT_ASSESSABLE}" if item.not_assessable else ""
-    return f"{count} contacts missed{most}{unseen}"
+    unseen = f"{item.not_assessable} {NOT_ASSESSABLE}" if item.not_assessable else ""
+    return ", ".join(filter(None, (f"{count} contacts missed{most}" if item.assessable else "", unseen)))
 
 
-def _evidence(evaluated: Evaluated, first: Summary, equal: Sequence[str]) -> str:
-    """Return how sure it is that the best detector is better than the others; empty without others."""
-    pairs = zip(evaluated.comparisons, without_difference(evaluated.comparisons), strict=True)
-    of_best = [
-        (pair.second if pair.first == first.detector else pair.first, pair, why)
-        for pair, why in pairs
+def _evidence(evaluated: Evaluated, first: Summary, equal: Sequence[str], alike: Sequence[str]) -> str:
+    """Return how sure it is that the best detector is better than the others; empty without others.
+
+    `alike` have as many contacts missed or not assessable and as many false alarms as the best one.
+    """
+    others = {
+        pair.second if pair.first == first.detector else pair.first: (pair, why)
+        for pair, why in zip(evaluated.comparisons, without_difference(evaluated.comparisons), strict=True)
         if pair.group == first.group and first.detector in (pair.first, pair.second)
+    }
+    others = {name: found for name, found in others.items() if name not in equal}
+    ahead = [
+        (name, _AHEAD[0 if pair.faster != name else 1 if name in alike else 2])
+        for name, (pair, _) in others.items()
+        if name in (pair.faster, pair.misses_less)
     ]
-    others = {name: (pair, why) for name, pair, why in of_best if name not in equal}
-    faster = [name for name, (pair, _) in others.items() if pair.faster == name]
-    alike = {name: why for name, (_, why) in others.items() if why}
-    words = f"; {_named(faster)} faster, but with more misses or false alarms" if faster else ""
-    if set(alike.values()) == {TOO_FEW}:
-        return f"{words}; {counted(first.assessable, 'contact', 'are')} too few to show a difference"
-    if alike:
-        return f"{words}; not shown to be better than {_named(list(alike))}"
+    said = {what: [name for name, of in ahead if of == what] for what in _AHEAD}
+    words = "".join(f"; {_named(names)} {what}" for what, names in said.items() if names)
+    unshown = {name: why for name, (_, why) in others.items() if why}
+    if unshown:
+        few = "too few recordings to show a difference"
+        alone = f"not shown to be better than {_named(list(unshown))}"
+        return f"{words}; {few if set(unshown.values()) == {TOO_FEW} else alone}"
     every = f"all {len(others)} others" if len(others) > 1 else _named(list(others))
     return words or (f"; shown to be better than {every}" if others else "")
 

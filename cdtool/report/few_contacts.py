@@ -61,15 +61,10 @@ def open_end(item: Summary) -> tuple[float, str] | None:
     Missed contacts leave the interval of the median open or, below ten contacts, the range if the median is not
     reached: "≥ 25.0 (n = 4)". Nothing is drawn where no contact was detected.
     """
-    if draws_no_interval(item):
-        least = item.min_ms if item.median.value == math.inf else math.nan
-    else:
-        least = item.median.low if item.median.high == math.inf else math.nan
-    return (
-        (least, f"≥ {number(least, error=item.resolution_ms)} (n = {item.assessable})")
-        if math.isfinite(least)
-        else None
-    )
+    median = item.median
+    least, end = (item.min_ms, median.value) if draws_no_interval(item) else (median.low, median.high)
+    words = f"≥ {number(least, error=item.resolution_ms)} (n = {item.assessable})"
+    return (least, words) if end == math.inf and math.isfinite(least) else None
 
 
 def grouped(rows: Iterable[Summary]) -> bool:

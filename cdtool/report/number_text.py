@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 
 from cdtool.base.plain_text import digits as plain_digits
+from cdtool.base.plain_text import digits_beside
 from cdtool.statistics.interval import Interval
 
 NOTHING = "–"
@@ -30,6 +31,15 @@ def number(value: float | None, digits: int = 3, error: float | None = None) -> 
     ('27.5', '28', '2.4', '1858')
     """
     return NOTHING if value is None else _written(value, _decimals(value, digits, error))
+
+
+def beside(value: float | None, limit: float) -> str:
+    """Return a number with the digits that show on which side of its limit it is.
+
+    >>> beside(400.04, 400.0), beside(412.3, 400.0)
+    ('400.04', '412')
+    """
+    return NOTHING if value is None else number(value, digits_beside(value, limit, 3))
 
 
 def short(value: float) -> str:
@@ -58,7 +68,7 @@ def value_and_interval(interval: Interval, error: float | None = None) -> tuple[
     least = max(1e-12, 1e-9 * width if math.isfinite(width) else 0.0)
     parts = [0.0 if abs(item) < least else item for item in (interval.value, interval.low, interval.high)]
     leading = next((item for item in (parts[0], parts[2], parts[1]) if item and math.isfinite(item)), 0.0)
-    if error is not None and math.isfinite(width):
+    if error is not None and least < width < math.inf:
         error = min(error, 0.5 * width)
     value, low, high = (_written(item, _decimals(leading, error=error)) for item in parts)
     if low == high and low in (NOT_REACHED, NOTHING):

@@ -73,8 +73,8 @@ def survival(latency: npt.ArrayLike, censored: npt.ArrayLike, level: float = 0.9
 
     d_i contacts are detected at t_i, n_i were monitored and undetected until then. The band holds at each time, not for
     the whole curve: S ** exp(-+ z sqrt(V) / ln S), V = sum of d_i / (n_i (n_i - d_i)) (log-log of Greenwood's
-    variance). At S = 1, where it does not exist, it is the exact bound of 0 of n_i; at S = 0 the upper limit is held
-    and the lower is 0.
+    variance). At S = 1, where it does not exist, it is the exact bound of 0 of n_i; at S = 0 the upper limit is held,
+    or if several contacts are detected at the last time, the exact bound of 0 of all detected; the lower is 0.
 
     Examples
     --------
@@ -157,18 +157,20 @@ def _checked(latency: npt.ArrayLike, censored: npt.ArrayLike) -> tuple[FloatArra
     time = np.asarray(latency, dtype=np.float64)
     missed = np.asarray(censored, dtype=np.bool_)
     if time.ndim != 1 or time.shape != missed.shape:
-        raise UsageError(
-            f"latency {time.shape} and censored {missed.shape} do not match", "give one of each per contact"
-        )
+        hint = "give one of each per contact"
+        raise UsageError(f"latency {time.shape} and censored {missed.shape} do not match", hint)
     if not np.all(np.isfinite(time) & (time >= 0.0)):
-        raise UsageError(
-            "a latency is missing or below 0", "for a missed contact, give the time for which it was monitored"
-        )
+        hint = "for a missed contact, give the time for which it was monitored"
+        raise UsageError("a latency is missing or below 0", hint)
     return time, missed
 
 
 def _curve(time: FloatArray, missed: BoolArray, level: float) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return times, S and its log-log band; the lower limit is 0 at S = 0, the upper one NaN; both are NaN at S = 1."""
+    """Return times, S and its log-log band; the lower limit is 0 at S = 0, the upper one NaN; both are NaN at S = 1.
+
+    If several are detected at the last time, the upper limit there is the exact bound of 0 of n detected: between
+    coarse times the curve has no step close to 0 whose limit could be used.
+    """
     from scipy import stats
 
     sample: stats.CensoredData[np.float64] = stats.CensoredData(time[~missed], right=time[missed])
@@ -178,7 +180,10 @@ def _curve(time: FloatArray, missed: BoolArray, level: float) -> tuple[FloatArra
         warnings.simplefilter("ignore", RuntimeWarning)
         band: Any = curve.confidence_interval(level, method="log-log")
     low = np.where(curve.probabilities == 0.0, 0.0, band.low.probabilities)
-    return curve.quantiles, curve.probabilities, low, band.high.probabilities
+    tied = np.count_nonzero(time[~missed] == time.max()) > 1
+    unseen = 1.0 - (0.5 - 0.5 * level) ** (1.0 / np.count_nonzero(~missed)) if tied else math.nan
+    high = np.where(curve.probabilities == 0.0, unseen, band.high.probabilities)
+    return curve.quantiles, curve.probabilities, low, high
 
 
 def _reached(times: FloatArray, level: FloatArray, target: float) -> float:
@@ -187,8 +192,7 @@ def _reached(times: FloatArray, level: FloatArray, target: float) -> float:
     if not len(at):
         return math.inf
     below = np.flatnonzero(level < target - _EXACT)
-    end = below[0] if len(below) else len(times) - 1
-    return float(0.5 * (times[at[0]] + times[end]))
+    return float(0.5 * (times[at[0]] + times[below[0] if len(below) else -1]))
 
 
 def _without_band(time: FloatArray, missed: BoolArray, value: float, share: float, level: float) -> Interval:

@@ -13,7 +13,9 @@ from tests.report.bench import contacts_of
 
 FAST, SLOW = [10.0, 11.0, 12.0, 13.0], [50.0, 51.0, 52.0, 53.0]
 MANY = [float(late) for late in range(20, 40)]
-FEW = "; 4 contacts are too few to show a difference"
+FEW = "; too few recordings to show a difference"
+SLOW_TAIL = [20.0 + 0.1 * i for i in range(16)] + [400.0 + i for i in range(8)]
+HALF_SEEN = [*(31.0 + i for i in range(10)), *["standing still"] * 10]
 
 
 def results_of(first, second, alarms=0, hours=0.5):
@@ -52,12 +54,34 @@ def told(results):
             "",
             "; not shown to be better than two",
         ),
-        ([late - 5.0 for late in MANY], MANY, 2, "two", "; one faster, but with more misses or false alarms"),
+        (
+            [late - 5.0 for late in MANY],
+            MANY,
+            2,
+            "two",
+            "; one faster, but with more misses, false alarms or contacts not assessable",
+        ),
+        # the least median, but a longer mean
+        (SLOW_TAIL, [25.0 + 0.1 * i for i in range(24)], 0, "one is best: median 21.2", "; two faster on average"),
+        (
+            [*[None] * 9, *(30.0 + i for i in range(11))],
+            HALF_SEEN,
+            0,
+            "one is best",
+            "; two shown to miss fewer of the contacts that both could assess",
+        ),
+        (["standing still"] * 4, ["standing still"] * 4, 0, "no detector detected a contact: 4 not assessable", ""),
     ],
 )
 def test_the_best_misses_least_then_is_quietest_then_fastest_and_how_sure_that_is(first, second, alarms, begins, ends):
     sentence = told(results_of(first, second, alarms))["stiff"]
     assert sentence.startswith(begins) and sentence.endswith(ends)
+
+
+def test_detectors_whose_medians_are_shown_with_different_digits_are_not_equal():
+    shifted = results_of([33.0 + 0.1 * i for i in range(12)], [33.1 + 0.1 * i for i in range(12)])
+    results = replace(shifted, contacts=tuple(replace(item, resolution_ms=1.0) for item in shifted.contacts))
+    assert told(results)["stiff"].startswith("one is best: median 33.6 ms")
 
 
 def test_a_group_without_contacts_has_its_false_alarms_with_their_bounds():

@@ -7,6 +7,8 @@ import math
 import pytest
 
 from cdtool.report.number_text import missed, number, percent, rate, with_interval
+from cdtool.report.tables.forces import contacts_table
+from cdtool.results.results import ForceResult, ForceStepResult, Results
 from cdtool.statistics.interval import Interval
 
 NAN, INF = math.nan, math.inf
@@ -51,6 +53,10 @@ def test_an_interval_has_the_digits_of_its_value(interval, text):
     assert with_interval(interval) == text
 
 
+def test_equal_latencies_are_no_finer_than_their_error():
+    assert with_interval(Interval(40.0, 40.0, 40.0), 40.0) == "40 (40 to 40)"
+
+
 @pytest.mark.parametrize(
     "value, error, text",
     [
@@ -84,3 +90,11 @@ def test_a_rate_without_an_alarm_is_only_its_bound():
     assert "".join(rate(0, Interval(0.0, 0.0, 37.0), 29.957)) == "0: at most 30.0"
     assert "".join(rate(1, Interval(10.0, 0.25, 55.7), 47.44)) == "10.0 (0.3 to 55.7): at most 47.4"
     assert "".join(rate(0, Interval(NAN, 0.0, INF), NAN)) == "–"
+
+
+def test_a_force_above_its_limit_is_not_shown_as_equal():
+    step = ForceStepResult("dynamic", 0.0, 400.0, 400.04, 49.0, "fail")
+    force = ForceResult("a.csv", "stiff", 1, "gate", "fail", 400.04, (step,))
+    results = Results({}, (), ("stiff",), (), (), (), (), forces=(force,))
+    (cell,) = contacts_table(results).cells("steps")
+    assert cell.text == "dynamic 400.04 of 400 N: fail"

@@ -105,6 +105,13 @@ def test_one_missed_contact_proves_nothing_and_six_prove_that_the_median_is_not_
     assert bounds(latency_quantile([1000.0] * 6, [True] * 6, 0.5)) == (INF, INF, INF)
 
 
+@pytest.mark.parametrize("last", [3, 6, 9])
+def test_contacts_detected_at_the_same_last_time_leave_the_median_an_upper_limit(last):
+    times = [8.0, *[9.0] * (10 - last), *[10.0] * last]
+    assert latency_quantile(times, [False] * 11, 0.5).high == 10.0
+    assert latency_quantile(times, [False] * 11, 0.95).high == math.inf  # 11 of 11 say little about the slowest 5 %
+
+
 @pytest.mark.parametrize(("share", "first"), [(0.5, 7), (0.9, 46), (0.95, 98)])
 def test_an_upper_limit_needs_as_many_detections_as_the_docs_say(share, first):
     few, enough = np.arange(1.0, first), np.arange(1.0, first + 1)

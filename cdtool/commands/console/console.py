@@ -216,12 +216,11 @@ def table(columns: Sequence[tuple[str, str]], rows: Sequence[Sequence[object]], 
 
 
 def _sizes(columns: Sequence[ColumnWidth], width: int) -> list[int]:
-    """Return the widths of columns side by side: sentences share what the others leave, a long name is folded."""
+    """Return the widths of columns side by side: sentences share what the others leave, long names are folded."""
     sizes = [column.needed for column in columns]
     left = width + _GAP - sum(size + _GAP for size in sizes)
-    if left < 0:
-        longest = max(sizes)
-        sizes[sizes.index(longest)] = max(longest + left, 1)
+    for _ in range(-left):
+        sizes[sizes.index(max(sizes))] -= 1
     for i, column in enumerate(columns if left > 0 else ()):
         sizes[i] += min(left, column.natural - column.needed)
         left -= sizes[i] - column.needed

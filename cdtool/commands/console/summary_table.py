@@ -206,7 +206,8 @@ def _show_statistics(summaries: Sequence[Summary]) -> None:
     parts += [f"0 false alarms in {of}: up to {number(max(alarms[of]))} per operation" for of in _ends(alarms)]
     if parts:
         say(f"{'; '.join(parts)} (95 %)")
-    say(explained(summaries).split(". ")[0])
+    for sentence in filter(None, explained(summaries).split(". ")[:1]):
+        say(sentence)
 
 
 def _ends(counts: Iterable[int]) -> list[int]:

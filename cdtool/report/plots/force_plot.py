@@ -14,7 +14,7 @@ import numpy as np
 from cdtool.base.plain_text import counted
 from cdtool.detectors.detection import Status
 from cdtool.report.model import AXES
-from cdtool.report.number_text import number, spoken
+from cdtool.report.number_text import beside, number, spoken
 from cdtool.report.plots.figures import drawing, label, message_figure, new_figure, save, slug, write
 from cdtool.report.plots.labels import LineLabel, place_labels
 from cdtool.report.plots.panels import cover_peak
@@ -188,7 +188,7 @@ def _step_text(step: StepVerdict) -> str:
     name = label(step.step.name, 22)
     if step.outcome == "not_assessable":
         return f"{name}: not assessable"
-    return f"{name}: {number(step.peak)} of {step.step.at_most_n:g} N"
+    return f"{name}: {beside(step.peak, step.step.at_most_n)} of {step.step.at_most_n:g} N"
 
 
 def _handles(ranked: Sequence[Sequence[TracedForce]], end: float) -> list[Artist]:

@@ -99,12 +99,14 @@ def latency_figure(evaluated: Evaluated) -> Figure:
     counts = {(item.detector, item.group): _count(item) for item in evaluated.summaries}
     for axes, group in zip(panels, groups, strict=True):
         _draw_group(axes, rows[group], marks, axis)
-        axes.set_title(label(shown(group), 60), loc="left", fontweight="bold", y=1.0)
+        axes.set_title(label(shown(group), 40), loc="left", fontweight="bold", y=1.0)
         for i, row in enumerate(rows[group]):
             free = [counts.get((row.detector, name), NOTHING) for name in impact_free]
             _write_row(table, axes, i, row, free)
     table.write_headings(panels[0])
-    panels[-1].set_xlabel(explained, linespacing=1.4)
+    # In the middle of the axis, unless the text would then begin left of the figure.
+    beside = 0.5 * text_width(explained.splitlines(), 10) + 0.1 - margins.left
+    panels[-1].set_xlabel(explained, linespacing=1.4, x=max(0.5, beside / 4.4))
     return figure
 
 
@@ -160,9 +162,8 @@ def _draw_marks(axes: Axes, row: int, detector: str, marks: _Marks, axis: _Axis)
     look = look_of(detector)
     for times, filled in ((marks.detected, True), (marks.missed, False)):
         shown = axis.shown(_thinned(times))
-        height = (
-            row - 0.12 + 0.42 * (np.arange(len(shown)) * 0.6180339887 % 1.0 - 0.5)
-        )  # evenly, without random numbers
+        # Evenly, without random numbers.
+        height = row - 0.12 + 0.42 * (np.arange(len(shown)) * 0.6180339887 % 1.0 - 0.5)
         axes.plot(
             shown,
             height,
@@ -173,6 +174,7 @@ def _draw_marks(axes: Axes, row: int, detector: str, marks: _Marks, axis: _Axis)
             markersize=4.5,
             markeredgewidth=0.4 if filled else 0.9,
             linestyle="none",
+            clip_on=False,
         )
 
 
@@ -220,7 +222,7 @@ def _write_row(table: SideTable, axes: Axes, place: int, row: Summary, impact_fr
 
 def _count(item: Summary) -> str:
     """Return the false alarms; a dash if the detector could not assess anything."""
-    return f"{item.false_alarms} in {item.operations} op." if item.hours > 0.0 else NOTHING
+    return f"{item.false_alarms} in {item.judged_operations} op." if item.watched else NOTHING
 
 
 def _explained(summaries: Sequence[Summary], marks: Sequence[_Marks], axis: _Axis) -> str:
@@ -236,12 +238,8 @@ def _explained(summaries: Sequence[Summary], marks: Sequence[_Marks], axis: _Axi
     lines.append(f"black: median{interval}{later}")
     if any(few):
         no_bar = f"no bar with fewer than {FEWEST} contacts{' or recordings' if grouped(summaries) else ''}"
-        lines = (
-            [*lines, no_bar]
-            # A longer line below the axis would begin left of the figure [characters].
-            if len(lines[-1]) + len(no_bar) > 90
-            else [*lines[:-1], f"{lines[-1]}; {no_bar}"]
-        )
+        # A longer line would be wider than the axis [characters].
+        lines[-1] += f"{'; ' if len(lines[-1]) + len(no_bar) <= 90 else chr(10)}{no_bar}"
     return "\n".join(lines)
 
 

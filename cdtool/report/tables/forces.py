@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from cdtool.report.many import most_rows
-from cdtool.report.number_text import NOTHING, number, spoken
+from cdtool.report.number_text import NOTHING, beside, spoken
 from cdtool.report.table import (
     Cell,
     Fields,
@@ -89,6 +89,7 @@ def _budget(after_ms: float | None) -> Cell:
 def _steps(steps: Sequence[ForceStepResult]) -> Cell:
     return Cell(
         "; ".join(
-            f"{item.name} {number(item.peak_n)} of {item.at_most_n:g} N: {spoken(item.verdict)}" for item in steps
+            f"{item.name} {beside(item.peak_n, item.at_most_n)} of {item.at_most_n:g} N: {spoken(item.verdict)}"
+            for item in steps
         )
     )

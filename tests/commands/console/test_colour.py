@@ -70,6 +70,14 @@ def test_a_table_fits_the_terminal_without_a_broken_word_or_trailing_blanks(term
     assert {word for line in lines for word in line.split()} == set(known.split())
 
 
+def test_two_long_names_of_a_row_are_folded_alike(terminal, monkeypatch, capsys):
+    terminal(80)
+    monkeypatch.setenv("NO_COLOR", "1")
+    table([("group", "left"), ("detector", "left"), ("missed", "right")], [["g" * 60, "d" * 60, "0 of 4"]])
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 3 and all(len(line) <= 80 for line in lines)
+
+
 def test_the_command_to_run_next_fits_and_can_be_pasted(terminal, capsys):
     terminal(60)
     words = ["cdtool", "benchmark", "a folder/benchmark.toml", "-p", "protocol.toml", "-o", "reports/protocol.pdf"]
@@ -129,6 +137,10 @@ def test_four_contacts_show_median_and_range_and_no_mean(capsys):
     assert not any("mean ms" in line or "P95 ms" in line for line in lines[:2])
     assert lines[-2].startswith("0 of 4 missed: up to 53 %")
     assert lines[-1] == "Fewer than 10 contacts detected: median and range, no mean, std or P95"
+
+
+def test_without_a_note_no_empty_line_is_left(capsys):
+    assert shown(capsys, {"momentum": [25.0 + i for i in range(60)]})[-1] == "0 of 60 missed: up to 4.9 % (95 %)"
 
 
 def test_groups_without_a_miss_have_one_line_of_bounds_with_the_fewest_and_the_most_contacts(capsys):

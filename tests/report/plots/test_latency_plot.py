@@ -11,7 +11,7 @@ from cdtool.report.plots import latency_plot
 from cdtool.report.plots.figures import drawing, save
 from cdtool.report.plots.latency_plot import latency_figure
 from cdtool.results.evaluated import evaluate
-from cdtool.results.results import Results
+from cdtool.results.results import ExposureResult, Results
 from tests.report.bench import contacts_of
 from tests.report.plots.svg import joined, texts
 
@@ -65,3 +65,17 @@ def test_no_contact_only_missed_and_a_single_one_are_drawn_too(results, tmp_path
     assert set(opened) == {1000.0}
     save(latency_figure(evaluate(of(results, [25.0]))), tmp_path / "one.svg")
     assert "1 of 1" in texts(tmp_path / "one.svg")
+
+
+def test_the_words_below_the_axis_begin_within_the_figure(results):
+    with drawing():
+        figure = latency_figure(evaluate(of(results, [None] * 4, "A")))
+        figure.canvas.draw()
+        assert figure.axes[-1].xaxis.label.get_window_extent().x0 >= 0.0
+
+
+def test_false_alarms_are_counted_among_the_operations_in_which_they_would_count(results, tmp_path):
+    free = (ExposureResult("stiff", "A", 4, 4, 0.5), ExposureResult("holdout", "A", 20, 20, 0.5, 5))
+    partly = replace(of(results, [30.0] * 4, "A"), groups=("stiff", "holdout"), exposure=free)
+    save(drawn(partly), tmp_path / "partly.svg")
+    assert "0 in 15 op." in texts(tmp_path / "partly.svg")
