@@ -12,8 +12,8 @@ from cdtool.base.plain_text import plain
 from cdtool.results.results import Results
 
 # A spreadsheet runs a cell that begins with one of these (the last four are their full-width forms). If its list
-# separator is a semicolon, a cell begins after each of them, in quotation marks or not.
-_RUN_BY_SPREADSHEETS = re.compile(r"(^|;)(\s*)(?=[=+\-@＝＋－＠])")
+# separator is not that of the file, a cell begins after each semicolon or comma, in quotation marks or not.
+_RUN_BY_SPREADSHEETS = re.compile(r"(^|[;,])(\s*)(?=[=+\-@＝＋－＠])")
 
 
 def csv_lines(results: Results, names: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str]:

@@ -103,6 +103,15 @@ def test_a_spreadsheet_that_splits_at_semicolons_runs_no_cell_either(results, st
     assert not any(cell.lstrip().startswith(RUN) for cell in cells)
 
 
+def test_a_file_with_decimal_commas_runs_no_cell_where_commas_separate(results):
+    text = "a,=1+1"
+    german = replace(
+        results, contacts=(contact(text, text, 1.0, name=text),), provenance={"report": {"decimal": "comma"}}
+    )
+    cells = [cell for row in csv.reader(io.StringIO(contacts_csv(german))) for cell in row]
+    assert not any(cell.startswith("=") for cell in cells)
+
+
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_hostile_names_stay_in_their_cell_and_control_nothing(results, kind):
     name = HOSTILE[kind]
