@@ -57,10 +57,7 @@ def with_interval(interval: Interval, error: float | None = None) -> str:
 
 
 def value_and_interval(interval: Interval, error: float | None = None) -> tuple[str, ...]:
-    """Return a value and its interval in brackets; an interval without an upper end is in two parts.
-
-    `error` of the values behind it; that of a mean is half its interval, if that is less.
-    """
+    """Return a value and its interval in brackets; an interval without an upper end is in two parts."""
     if not interval.known:
         return (NOTHING,)
     width = interval.high - interval.low
@@ -68,8 +65,6 @@ def value_and_interval(interval: Interval, error: float | None = None) -> tuple[
     least = max(1e-12, 1e-9 * width if math.isfinite(width) else 0.0)
     parts = [0.0 if abs(item) < least else item for item in (interval.value, interval.low, interval.high)]
     leading = next((item for item in (parts[0], parts[2], parts[1]) if item and math.isfinite(item)), 0.0)
-    if error is not None and least < width < math.inf:
-        error = min(error, 0.5 * width)
     value, low, high = (_written(item, _decimals(leading, error=error)) for item in parts)
     if low == high and low in (NOT_REACHED, NOTHING):
         return (value,)

@@ -11,7 +11,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from cdtool.report.writers.csv import contacts_lines, forces_lines
+from cdtool.report.writers.contacts import contacts_lines
+from cdtool.report.writers.forces import forces_lines
 from cdtool.results.results import ForceResult, ForceStepResult, Results
 from tests.command import cdtool
 from tests.report.bench import contact

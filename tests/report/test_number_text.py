@@ -75,9 +75,9 @@ def test_no_digit_is_finer_than_the_error(value, error, text):
     assert with_interval(Interval(value, NAN, NAN), error) == f"{text}"
 
 
-def test_the_mean_of_many_contacts_has_the_digits_of_its_own_error():
-    assert with_interval(Interval(33.333, 32.93, 33.73), 2.05) == "33.3 (32.9 to 33.7)"
-    assert with_interval(Interval(33.333, 25.0, 41.0), 2.05) == "33 (25 to 41)"
+def test_an_interval_is_no_finer_than_the_values_behind_it():
+    assert with_interval(Interval(33.333, 32.93, 33.73), 2.05) == "33 (33 to 34)"
+    assert with_interval(Interval(33.333, 32.93, 33.73), 0.2) == "33.3 (32.9 to 33.7)"
 
 
 def test_no_missed_contact_is_a_bound_and_not_zero():

@@ -13,7 +13,7 @@ from cdtool.report.markdown.report import to_markdown
 from cdtool.report.outputs import check_outputs, write_outputs
 from cdtool.report.plots.figures import slug
 from cdtool.report.writers.base import Report
-from cdtool.report.writers.csv import contacts_lines
+from cdtool.report.writers.contacts import contacts_lines
 from cdtool.report.writers.junit import to_junit
 from cdtool.results.evaluated import evaluate
 from cdtool.results.results import SCHEMA_VERSION

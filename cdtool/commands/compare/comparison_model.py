@@ -16,7 +16,6 @@ from cdtool.report.number_text import NOTHING, number
 from cdtool.report.table import Cell, Fields, Heading, Table, name_cell, shown, tabulate
 
 _TONES = {"worse": "bad", "mixed": "bad", "inconclusive": "unknown"}
-_MEANS = ("latency_ms", "force_at_alarm_n")
 _HOW_TO_READ = (
     "Two values are old / new. Contacts: the same ones in both, unless there are two numbers. Latency is a mean (of "
     "fewer than ten contacts a median) and the force at the alarm a median, of the contacts that both detected; "
@@ -80,17 +79,18 @@ def both(row: BuildRow, figure: Figure, digits: int = 3) -> str:
     answer = row.question(figure)
     if answer is None or (math.isnan(answer.old) and math.isnan(answer.new)):
         return NOTHING
-    if figure in _MEANS:
-        return f"{number(answer.old, digits)} / {number(answer.new, digits)}"
-    return f"{answer.old:.0f} / {answer.new:.0f}"
+    # Means of ten or more contacts can differ by less than the resolution of one.
+    error = {"latency_ms": row.resolution_ms if answer.ranges else None, "force_at_alarm_n": None}.get(figure, 1.0)
+    return f"{number(answer.old, digits, error)} / {number(answer.new, digits, error)}"
 
 
 def ranges_of(row: BuildRow) -> str:
-    """Return the ranges of latency of both builds as "25.0 to 28.0 / 30.0 to 34.0"; empty with ten or more contacts."""
+    """Return the ranges of latency of both builds as "25 to 28 / 30 to 34"; empty with ten or more contacts."""
     latency = row.question("latency_ms")
     if latency is None or latency.ranges is None:
         return ""
-    return " / ".join(" to ".join(dict.fromkeys(map(number, ends))) for ends in latency.ranges)
+    texts = ([number(end, error=row.resolution_ms) for end in ends] for ends in latency.ranges)
+    return " / ".join(" to ".join(dict.fromkeys(ends)) for ends in texts)
 
 
 def contacts_of(row: BuildRow) -> str:

@@ -58,7 +58,7 @@ class BuildRow:
     compared one by one where `paired`; in `one_not_assessable` of them one build could not assess the contact, which
     counts there alone. What happened on the pairs: the new build is later on `later` of them, by `later_ms` (least,
     most), earlier on `earlier`, and later by `later_share` of the old mean; `newly_missed` and `newly_detected` count
-    the contacts that only one of the builds missed.
+    the contacts that only one of the builds missed. No latency is finer than `resolution_ms`, None if unknown.
     """
 
     detector: str
@@ -77,6 +77,7 @@ class BuildRow:
     earlier_ms: tuple[float, float] | None = None
     newly_missed: int = 0
     newly_detected: int = 0
+    resolution_ms: float | None = None
 
     @property
     def outcome(self) -> Outcome:
@@ -201,6 +202,7 @@ def ask(
         earlier_ms=(min(early), max(early)) if early else None,
         newly_missed=outcomes.count(("detected", "missed")),
         newly_detected=outcomes.count(("missed", "detected")),
+        resolution_ms=max((item.resolution_ms for item in (*old, *new) if item.resolution_ms), default=None),
     )
     return row, asked
 

@@ -199,7 +199,7 @@ class BenchmarkResult:
         from cdtool.report.tables.results import results_table
 
         table = results_table(self.evaluated.summaries)
-        bounds = [part.line.replace(";", ":", 1) for part in table.parts.values() if part.details]
+        bounds = [f"{part.text}: {'; '.join(part.lines[1:])}" for part in table.parts.values() if part.details]
         about = "\n".join((counts_text(self.evaluated), *bounds))
         return notebook_table(self.headline, as_frame(table), about, self.results.conclusion.tone)
 

@@ -63,7 +63,8 @@ def test_few_contacts_have_median_and_range_and_no_mean_as_in_the_reports(result
     every = result.summary(every=True)
     assert set(FIGURES) <= set(every) and every.columns[: len(row)].tolist() == row.index.tolist()
     table, shown = results_table(result.evaluated.summaries), result._repr_html_()
-    assert all(cell.line in shown for line in (*table.rows, table.parts.values()) for cell in line)
+    assert all(cell.line in shown for row in table.rows for cell in row)
+    assert all(part.text in shown and all(line in shown for line in part.lines) for part in table.parts.values())
 
 
 def test_a_recording_becomes_a_frame_with_the_names_of_convert(tmp_path):

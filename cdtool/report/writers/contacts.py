@@ -1,4 +1,4 @@
-"""Rows as CSV that is safe in spreadsheets and terminals: text from files stays text."""
+"""Contacts as a table for spreadsheets, and rows as CSV that is safe in them and in terminals: text stays text."""
 
 from __future__ import annotations
 
@@ -6,14 +6,39 @@ import csv
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import fields
 from io import StringIO
+from pathlib import Path
+from typing import ClassVar
 
+from cdtool.base.files.foreign import Kind
+from cdtool.base.files.writing import write_pieces
 from cdtool.base.plain_text import plain
-from cdtool.results.results import Results
+from cdtool.report.writers.base import Report, Writer
+from cdtool.results.results import ContactResult, Results
 
 # A spreadsheet runs a cell that begins with one of these (the last four are their full-width forms). If its list
 # separator is not that of the file, a cell begins after each semicolon or comma, in quotation marks or not.
 _RUN_BY_SPREADSHEETS = re.compile(r"(^|[;,])(\s*)(?=[=+\-@＝＋－＠])")
+
+
+class Contacts(Writer[Report]):
+    """CSV: a row per contact and detector."""
+
+    name: ClassVar[str] = "contacts"
+    suffixes: ClassVar[tuple[str, ...]] = (".csv",)
+    in_folder: ClassVar[str] = "contacts.csv"
+    kinds: ClassVar[dict[str, Kind]] = {".csv": Kind(b"force_at_alarm_n", "table of cdtool")}
+
+    def write(self, report: Report, target: Path) -> None:
+        """Write it; raises CdtoolError."""
+        write_pieces(target, contacts_lines(report.evaluated.results))
+
+
+def contacts_lines(results: Results) -> Iterator[str]:
+    """Yield a row per contact and detector, in the order and under the names of results.json; empty = no value."""
+    names = [item.name for item in fields(ContactResult)]
+    return csv_lines(results, names, ([getattr(contact, name) for name in names] for contact in results.contacts))
 
 
 def csv_lines(results: Results, names: Sequence[str], rows: Iterable[Sequence[object]]) -> Iterator[str]:
