@@ -1,8 +1,8 @@
 """Each group of a benchmark in a sentence: the best detector, its latency, and what its zeros can mean at most.
 
 Conventions: best is who has the fewest contacts missed or not assessable, then the fewest false alarms in all groups,
-then the least median as it is shown; equal ones are named together. Whether that difference is more than chance is
-known from the comparisons of pairs.
+then the least median as it is shown; equal ones are named together unless their comparison shows a difference. Whether
+a difference is more than chance is known from the comparisons of pairs.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from cdtool.base.plain_text import NAMED, counted
 from cdtool.report.number_text import NOT_ASSESSABLE, missed, value_and_interval
 from cdtool.report.table import Cell, Heading, Table, name_cell, shown
 from cdtool.report.tables.results import TOO_FEW, at_most, has_exposure, latency_cell, part_of, without_difference
+from cdtool.results.comparison import Comparison
 from cdtool.results.evaluated import Evaluated
 from cdtool.results.summary import Summary
 
@@ -27,6 +28,7 @@ _AHEAD = (
     "faster on average",
     "faster, but with more misses, false alarms or contacts not assessable",
 )
+_FEW = "too few recordings to show a difference"
 _ALARMS_UNKNOWN = f"false alarms {NOT_ASSESSABLE}"
 
 
@@ -61,14 +63,16 @@ def _of_contacts(evaluated: Evaluated, items: Sequence[Summary], alarms: Mapping
 
     first, *others = sorted(items, key=rank)
     alike = [item.detector for item in others if rank(item)[:2] == rank(first)[:2]]
-    places = [item for item in others if _median(item).split(" (")[0] == _median(first).split(" (")[0]]
-    equal = [first.detector, *(item.detector for item in places if item.detector in alike)]
+    same = [item.detector for item in others if _median(item).split(" (")[0] == _median(first).split(" (")[0]]
+    pairs = _pairs(evaluated, first)
+    unlike = [name for name, (_, why) in pairs.items() if not why]
+    equal = [first.detector, *(name for name in same if name in alike and name not in unlike)]
     words = "every detector missed contacts; " if others and all(item.missed for item in items) else ""
     words += _named(equal) + (" are equally good" if len(equal) > 1 else " is best" if others else "")
     count = alarms[first.detector]
     heard = f"{counted(int(count), 'false alarm')} in all groups" if math.isfinite(count) else _ALARMS_UNKNOWN
     heard = heard if count else "no false alarm"
-    return f"{words}: median {_median(first)}, {_outcomes(first)}, {heard}{_evidence(evaluated, first, equal, alike)}"
+    return f"{words}: median {_median(first)}, {_outcomes(first)}, {heard}{_evidence(pairs, equal, alike)}"
 
 
 def _median(item: Summary) -> str:
@@ -87,29 +91,29 @@ def _outcomes(item: Summary) -> str:
     return ", ".join(filter(None, (f"{count} contacts missed{most}" if item.assessable else "", unseen)))
 
 
-def _evidence(evaluated: Evaluated, first: Summary, equal: Sequence[str], alike: Sequence[str]) -> str:
-    """Return how sure it is that the best detector is better than the others; empty without others.
-
-    `alike` have as many contacts missed or not assessable and as many false alarms as the best one.
-    """
-    others = {
+def _pairs(evaluated: Evaluated, first: Summary) -> dict[str, tuple[Comparison, str]]:
+    """Return by the other detector its comparison with the first one, and why that shows no difference; else ""."""
+    return {
         pair.second if pair.first == first.detector else pair.first: (pair, why)
         for pair, why in zip(evaluated.comparisons, without_difference(evaluated.comparisons), strict=True)
         if pair.group == first.group and first.detector in (pair.first, pair.second)
     }
-    others = {name: found for name, found in others.items() if name not in equal}
-    ahead = [
-        (name, _AHEAD[0 if pair.faster != name else 1 if name in alike else 2])
-        for name, (pair, _) in others.items()
-        if name in (pair.faster, pair.misses_less)
-    ]
-    said = {what: [name for name, of in ahead if of == what] for what in _AHEAD}
+
+
+def _evidence(pairs: Mapping[str, tuple[Comparison, str]], equal: Sequence[str], alike: Sequence[str]) -> str:
+    """Return how sure it is that the best detector is better than the others; empty without others.
+
+    `alike` have as many contacts missed or not assessable and as many false alarms as the best one.
+    """
+    others = {name: found for name, found in pairs.items() if name not in equal}
+    ahead = {name: pair for name, (pair, _) in others.items() if name in (pair.faster, pair.misses_less)}
+    kinds = [_AHEAD[0 if pair.faster != name else 1 if name in alike else 2] for name, pair in ahead.items()]
+    said = {what: [name for name, of in zip(ahead, kinds, strict=True) if of == what] for what in _AHEAD}
     words = "".join(f"; {_named(names)} {what}" for what, names in said.items() if names)
     unshown = {name: why for name, (_, why) in others.items() if why}
     if unshown:
-        few = "too few recordings to show a difference"
-        alone = f"not shown to be better than {_named(list(unshown))}"
-        return f"{words}; {few if set(unshown.values()) == {TOO_FEW} else alone}"
+        few = set(unshown.values()) == {TOO_FEW}
+        return f"{words}; {_FEW if few else f'not shown to be better than {_named(list(unshown))}'}"
     every = f"all {len(others)} others" if len(others) > 1 else _named(list(others))
     return words or (f"; shown to be better than {every}" if others else "")
 
