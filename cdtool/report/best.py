@@ -114,7 +114,7 @@ def _evidence(pairs: Mapping[str, tuple[Comparison, str]], equal: Sequence[str],
     if unshown:
         few = set(unshown.values()) == {TOO_FEW}
         return f"{words}; {_FEW if few else f'not shown to be better than {_named(list(unshown))}'}"
-    every = f"all {len(others)} others" if len(others) > 1 else _named(list(others))
+    every = f"all {len(others)} others" if len(others) > 2 else _named(list(others))
     return words or (f"; shown to be better than {every}" if others else "")
 
 

@@ -127,7 +127,7 @@ def results_table(items: Sequence[Summary]) -> Table:
     for group, of_group in grouped(items, "group").items():
         own = [[make(item) for _, make in fields] for item in of_group]
         if len(own) > 1 and not of_group[0].contacts and all(row[1:] == own[0][1:] for row in own):
-            own = [[Cell(f"all {len(own)} detectors"), *own[0][1:]]]
+            own = [[Cell(f"all {len(own)} detectors" if len(own) > 2 else "both detectors"), *own[0][1:]]]
         shared = [_taken_out(own, place, field.heading) for place, (field, _) in enumerate(fields)]
         failed = of_group[0].force_failed
         shared += [f"; force limit exceeded by {counted(int(failed), 'contact')}"] if failed > 0.0 else []
